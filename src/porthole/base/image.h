@@ -1,0 +1,74 @@
+// A rectangle of pixels and a row-major image. Pixel (0,0) is top-left, its centre (0.5, 0.5).
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "porthole/base/math.h"
+
+namespace porthole {
+
+/// Half-open pixel rectangle [x0, x1) x [y0, y1).
+struct Rect {
+    std::int32_t x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+    [[nodiscard]] constexpr std::int32_t width() const { return x1 - x0; }
+    [[nodiscard]] constexpr std::int32_t height() const { return y1 - y0; }
+    [[nodiscard]] constexpr bool empty() const { return x0 >= x1 || y0 >= y1; }
+    [[nodiscard]] constexpr bool contains(std::int32_t x, std::int32_t y) const {
+        return x >= x0 && x < x1 && y >= y0 && y < y1;
+    }
+    [[nodiscard]] constexpr Rect grown(std::int32_t by) const { return {x0 - by, y0 - by, x1 + by, y1 + by}; }
+    [[nodiscard]] constexpr Rect intersected(Rect r) const {
+        return {x0 > r.x0 ? x0 : r.x0, y0 > r.y0 ? y0 : r.y0, x1 < r.x1 ? x1 : r.x1, y1 < r.y1 ? y1 : r.y1};
+    }
+    friend constexpr bool operator==(const Rect&, const Rect&) = default;
+};
+
+/// Row-major pixels of `window`; coordinates are absolute, so that a crop and the
+/// full picture share them.
+template <typename T> class Image {
+public:
+    Image() = default;
+    explicit Image(Rect window, T fill = T{})
+        : window_(window), pixels_(window.empty() ? 0 : std::size_t(window.width()) * std::size_t(window.height()), fill) {}
+    Image(std::int32_t width, std::int32_t height, T fill = T{}) : Image(Rect{0, 0, width, height}, fill) {}
+
+    [[nodiscard]] Rect window() const { return window_; }
+    [[nodiscard]] std::int32_t width() const { return window_.width(); }
+    [[nodiscard]] std::int32_t height() const { return window_.height(); }
+    [[nodiscard]] bool empty() const { return pixels_.empty(); }
+    [[nodiscard]] bool contains(std::int32_t x, std::int32_t y) const { return window_.contains(x, y); }
+
+    T& operator()(std::int32_t x, std::int32_t y) { return pixels_[index(x, y)]; }
+    const T& operator()(std::int32_t x, std::int32_t y) const { return pixels_[index(x, y)]; }
+    /// The pixel at (x, y), or `outside` beyond the window.
+    [[nodiscard]] T at_or(std::int32_t x, std::int32_t y, T outside) const {
+        return contains(x, y) ? (*this)(x, y) : outside;
+    }
+    T* row(std::int32_t y) { return pixels_.data() + index(window_.x0, y); }
+    const T* row(std::int32_t y) const { return pixels_.data() + index(window_.x0, y); }
+    std::vector<T>& pixels() { return pixels_; }
+    [[nodiscard]] const std::vector<T>& pixels() const { return pixels_; }
+
+    [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y) const {
+        assert(contains(x, y));
+        return std::size_t(y - window_.y0) * std::size_t(window_.width()) + std::size_t(x - window_.x0);
+    }
+    friend bool operator==(const Image&, const Image&) = default;
+
+private:
+    Rect window_;
+    std::vector<T> pixels_;
+};
+
+struct Rgba8 {
+    std::uint8_t r = 0, g = 0, b = 0, a = 255;
+    friend constexpr bool operator==(const Rgba8&, const Rgba8&) = default;
+};
+
+/// Yes/no per pixel (std::vector<bool> is not thread-safe per element).
+using Mask = Image<std::uint8_t>;
+
+} // namespace porthole

@@ -1,0 +1,53 @@
+// Bytes in and out: memory-mapped input, atomic output, paths that stay in their folder.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace porthole {
+
+/// A whole file, mapped read-only (regular files) or read into memory (pipes). Move-only.
+class FileBytes {
+public:
+    /// @throws Error input E0201 not found, E0202 unreadable or a folder, E0203 empty.
+    explicit FileBytes(const std::filesystem::path& path);
+    /// Bytes already in memory.
+    explicit FileBytes(std::string bytes);
+    FileBytes(FileBytes&&) noexcept;
+    FileBytes& operator=(FileBytes&&) noexcept;
+    ~FileBytes();
+    [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
+    [[nodiscard]] std::string_view text() const {
+        return {reinterpret_cast<const char*>(bytes_.data()), bytes_.size()};
+    }
+
+private:
+    std::span<const std::byte> bytes_;
+    std::string owned_;
+    void* mapped_ = nullptr;
+};
+
+/// The file that `reference` (a relative path or percent-encoded URI found inside `model`)
+/// names, if it is an existing regular file in the model's folder or below, after resolving
+/// symbolic links.
+/// @throws Error input E0210 when it leaves the folder, is absolute, names a scheme or a
+///         device; E0211 when it does not exist. `where` is filled by the caller's text.
+[[nodiscard]] std::filesystem::path resolve_beside(const std::filesystem::path& model, std::string_view reference,
+                                                   const std::string& where);
+
+/// Writes `bytes` to a temporary name in the same folder, syncs and renames over `path`.
+/// "-" writes to standard output. A failure leaves what was there before.
+/// @throws Error output E0801 (cannot create), E0802 (write failed, e.g. disk full), E0803 (rename).
+void write_file(const std::string& path, std::span<const std::byte> bytes, bool no_clobber = false);
+
+/// `text` with invalid UTF-8 sequences replaced by U+FFFD.
+[[nodiscard]] std::string valid_utf8(std::string_view text);
+
+/// `text` for a terminal or a log line: valid UTF-8, control and bidirectional-override
+/// characters written as \n, \x1b, \u202e, at most `limit` bytes.
+[[nodiscard]] std::string escaped(std::string_view text, std::size_t limit = 300);
+
+} // namespace porthole

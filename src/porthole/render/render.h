@@ -1,0 +1,64 @@
+// Whitted-style rendering: nearest hit, shadows, ambient occlusion, reflection, refraction,
+// antialiasing where neighbours differ; with a cut, what lies behind it.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "porthole/base/cut.h"
+#include "porthole/base/parallel.h"
+#include "porthole/base/view.h"
+#include "porthole/scene/scene.h"
+#include "porthole/trace/bvh.h"
+
+namespace porthole {
+
+enum class Emphasis : std::uint8_t { accent, saturate, none };
+enum class Shading : std::uint8_t { raytraced, flat };
+
+struct RenderParams {
+    int samples = 8;       ///< most samples per pixel, spent where neighbours differ; 1: one at each centre
+    int ao_samples = 4;    ///< ambient occlusion rays per pixel; 0: none
+    bool shadows = true;
+    int max_bounces = 6;   ///< reflections and refractions along one path
+    Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
+    Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
+    Vec3f background{1, 1, 1}; ///< linear
+    std::uint64_t seed = 0;
+};
+
+struct RayCounts {
+    std::int64_t primary = 0, shadow = 0, ambient = 0, reflection = 0, refraction = 0;
+};
+
+/// A rendered picture with its ids.
+struct Frame {
+    Image<Vec4f> color; ///< linear Rec.709, premultiplied alpha; alpha 0 where nothing is hit (background not in it)
+    IdBuffer ids;       ///< at pixel centres: nearest part that is not cut away, and its depth
+    RayCounts rays;
+};
+
+/// What does not depend on the view: lights (the file's, or the default rig), ambient radius,
+/// per-part flags. Cheap to make; plain value.
+struct Lighting;
+
+/// Draws `view` of everything in `bvh`.
+///
+/// Without a cut this is the plain picture. With one, only samples inside the hole start
+/// rays that the cut opens; the caller draws the plain frame first and hands it as `under`:
+/// pixels without any sample in the hole are copied from it bit for bit, so the picture
+/// outside the hole *is* the plain picture.
+///
+/// @param bvh      every part, built with the roles of `cut` when there is one.
+/// @param targets  hierarchy of the opened targets only; used with a cut: each sample inside
+///                 or at the rim of the hole asks it first. May be null without a cut.
+/// @param cut      may be null.
+/// @param under    plain frame of the same view and params; null exactly when `cut` is.
+/// @return colour, ids at pixel centres, rays spent (of this call).
+/// @throws Cancelled; Error limit E0902.
+/// The same bits for any number of threads.
+[[nodiscard]] Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params,
+                           const Cut* cut, const Frame* under, const Control& control = {});
+
+} // namespace porthole
