@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace porthole {
@@ -25,8 +26,8 @@ enum class ErrorKind {
 /// E06xx STL, E07xx images, E08xx output, E09xx limits; Wxxxx alike.
 class Error : public std::runtime_error {
 public:
-    Error(ErrorKind kind, std::string code, std::string where, const std::string& reason)
-        : std::runtime_error(reason), kind(kind), code(std::move(code)), where(std::move(where)) {}
+    Error(ErrorKind error_kind, std::string error_code, std::string place, const std::string& reason)
+        : std::runtime_error(reason), kind(error_kind), code(std::move(error_code)), where(std::move(place)) {}
 
     ErrorKind kind;
     std::string code;

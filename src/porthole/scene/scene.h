@@ -145,7 +145,8 @@ MeshRepair finish_mesh(Mesh& mesh);
 void recentre(Scene& scene);
 
 /// Gives every part a unique `path`, from the names of its ancestors and itself. `chains[i]`
-/// lists them from the root; empty and sibling-repeated segments become "[n]" or "name[n]",
+/// lists them from the root (unnamed groups already numbered "[n]" by the reader); parts whose
+/// whole path is empty or repeated get "[n]" appended,
 /// n counting from 0 in file order among equals.
 void assign_paths(Scene& scene, const std::vector<std::vector<std::string>>& chains);
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "porthole/base/cut.h"
@@ -27,11 +28,11 @@ struct alignas(64) RayHit16 {
     std::uint32_t instance[kLanes]; ///< after intersect(): part id, or kNoPart's value
 
     /// Sets lane `i`: ready for intersect() or occluded().
-    void set(int i, Vec3f origin, Vec3f direction, float tnear, float tfar, std::uint32_t mask = 0xFFFFFFFFu) {
-        org_x[i] = origin.x, org_y[i] = origin.y, org_z[i] = origin.z;
-        dir_x[i] = direction.x, dir_y[i] = direction.y, dir_z[i] = direction.z;
-        this->tnear[i] = tnear, this->tfar[i] = tfar, time[i] = 0;
-        this->mask[i] = mask, id[i] = std::uint32_t(i), flags[i] = 0;
+    void set(int i, Vec3f org, Vec3f dir, float t0, float t1, std::uint32_t ray_mask = 0xFFFFFFFFu) {
+        org_x[i] = org.x, org_y[i] = org.y, org_z[i] = org.z;
+        dir_x[i] = dir.x, dir_y[i] = dir.y, dir_z[i] = dir.z;
+        tnear[i] = t0, tfar[i] = t1, time[i] = 0;
+        mask[i] = ray_mask, id[i] = std::uint32_t(i), flags[i] = 0;
         geometry[i] = 0xFFFFFFFFu, instance[i] = 0xFFFFFFFFu;
     }
     /// Makes lane `i` inactive: it hits nothing.
@@ -82,6 +83,7 @@ public:
     [[nodiscard]] const State& state() const { return *state_; }
     [[nodiscard]] const Scene& scene() const;
     [[nodiscard]] bool empty() const; ///< no parts
+    [[nodiscard]] bool holds(PartId part) const; ///< among the parts it was built from
 
 private:
     std::unique_ptr<State> state_;
@@ -91,8 +93,8 @@ private:
 inline constexpr std::uint32_t kMaskFixed = 1, kMaskCutSet = 2, kMaskLoose = 4, kMaskAll = 0xFFFFFFFFu;
 
 /// @param parts  the parts it holds, each at most once. Of parts that coincide exactly (same
-///               mesh data and transform) only the first *in `parts`* is held, so that a part
-///               duplicated in place changes nothing.
+///               mesh data and transform) only one can be hit, a fixed one before others, then
+///               the first by path: a part duplicated in place changes nothing.
 /// @param roles  by part id: sets each instance's ray mask (kMaskFixed, kMaskCutSet,
 ///               kMaskLoose); empty: every mask hits.
 /// Hits do not depend on the order of `parts` nor on the number of threads.
@@ -109,8 +111,24 @@ void intersect(const Bvh& bvh, RayHit16& rays, Coherence coherence);
 /// Incoherent always: coherent occlusion packets on instances did not return (docs/decisions).
 void occluded(const Bvh& bvh, RayHit16& rays, const Cut* cut, Vec3f* transmittance);
 
-/// Nearest hit that `cut` leaves (all of them without a cut), one ray. Same result type in
-/// lane 0 of `ray`; for reflected and refracted rays.
-void intersect_cut(const Bvh& bvh, RayHit16& ray, int lane, const Cut* cut);
+/// Calls visit(lane, part, t) for every surface that the active lanes cross between tnear and
+/// tfar, in no particular order but the same every time. Alpha-masked texels are no surface.
+/// `rays` keeps its tfar.
+template <typename Visit> void for_each_crossing(const Bvh& bvh, RayHit16& rays, Visit&& visit);
+
+/// Nearest hit that `cut` leaves (all of them without a cut) of one lane of `rays`, the result
+/// in that lane; for reflected and refracted rays.
+void intersect_cut(const Bvh& bvh, RayHit16& rays, int lane, const Cut* cut);
+
+namespace detail {
+using VisitCrossing = void (*)(void* visit, int lane, PartId part, float t);
+void for_each_crossing(const Bvh& bvh, RayHit16& rays, VisitCrossing call, void* visit);
+} // namespace detail
+
+template <typename Visit> void for_each_crossing(const Bvh& bvh, RayHit16& rays, Visit&& visit) {
+    using V = std::remove_reference_t<Visit>;
+    detail::for_each_crossing(
+        bvh, rays, [](void* v, int lane, PartId part, float t) { (*static_cast<V*>(v))(lane, part, t); }, &visit);
+}
 
 } // namespace porthole

@@ -1,0 +1,140 @@
+#include "porthole/scene/scene.h"
+
+#include <algorithm>
+#include <unordered_map>
+
+namespace porthole {
+
+std::uint32_t Mesh::material_of(std::uint32_t triangle) const {
+    if (submeshes.size() == 1) return submeshes[0].material;
+    const auto after = std::upper_bound(submeshes.begin(), submeshes.end(), triangle,
+                                        [](std::uint32_t t, const Submesh& s) { return t < s.first_triangle; });
+    return std::prev(after)->material;
+}
+
+Bounds3d part_bounds(const Scene& scene, PartId id) {
+    const Part& part = scene.parts[index(id)];
+    const Mesh& mesh = scene.meshes[part.mesh];
+    Bounds3d bounds;
+    for (const Vec3f& p : mesh.positions) bounds.extend(part.world_from_mesh.point(Vec3d(p)));
+    return bounds;
+}
+
+Bounds3d scene_bounds(const Scene& scene) {
+    Bounds3d bounds;
+    for (const PartId id : all_parts(scene)) bounds.extend(part_bounds(scene, id));
+    return bounds;
+}
+
+std::vector<PartId> all_parts(const Scene& scene) {
+    std::vector<PartId> ids(scene.parts.size());
+    for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = PartId{i};
+    return ids;
+}
+
+std::uint64_t triangle_count(const Scene& scene) {
+    std::uint64_t n = 0;
+    for (const Part& part : scene.parts) n += scene.meshes[part.mesh].triangles.size();
+    return n;
+}
+
+namespace {
+
+// Embree's own limit: beyond it squares overflow inside the traversal.
+constexpr float kLargestCoordinate = 1.8e18f;
+
+bool usable(Vec3f p) {
+    return std::abs(p.x) < kLargestCoordinate && std::abs(p.y) < kLargestCoordinate &&
+           std::abs(p.z) < kLargestCoordinate;
+}
+
+bool has_area(Vec3f a, Vec3f b, Vec3f c) {
+    const Vec3d n = cross(Vec3d(b) - Vec3d(a), Vec3d(c) - Vec3d(a));
+    return dot(n, n) > 0;
+}
+
+} // namespace
+
+MeshRepair finish_mesh(Mesh& mesh) {
+    MeshRepair repair;
+    const std::size_t vertices = mesh.positions.size();
+
+    std::vector<Submesh> kept;
+    std::size_t out = 0;
+    for (const Submesh& s : mesh.submeshes) {
+        Submesh run{static_cast<std::uint32_t>(out), 0, s.material};
+        for (std::uint32_t i = 0; i < s.triangle_count; ++i) {
+            const Vec3u t = mesh.triangles[s.first_triangle + i];
+            if (t.x >= vertices || t.y >= vertices || t.z >= vertices) {
+                ++repair.non_finite;
+                continue;
+            }
+            const Vec3f a = mesh.positions[t.x], b = mesh.positions[t.y], c = mesh.positions[t.z];
+            if (!usable(a) || !usable(b) || !usable(c)) {
+                ++repair.non_finite;
+                continue;
+            }
+            if (t.x == t.y || t.y == t.z || t.z == t.x || !has_area(a, b, c)) {
+                ++repair.degenerate;
+                continue;
+            }
+            mesh.triangles[out++] = t;
+        }
+        run.triangle_count = static_cast<std::uint32_t>(out) - run.first_triangle;
+        if (run.triangle_count > 0) kept.push_back(run);
+    }
+    mesh.triangles.resize(out);
+    mesh.submeshes = std::move(kept);
+
+    // Vertices that no triangle uses would spoil boxes: they move onto one that is used.
+    std::vector<std::uint8_t> used(vertices, 0);
+    for (const Vec3u& t : mesh.triangles) used[t.x] = used[t.y] = used[t.z] = 1;
+    mesh.bounds = {};
+    for (std::size_t i = 0; i < vertices; ++i)
+        if (used[i]) mesh.bounds.extend(mesh.positions[i]);
+        else mesh.positions[i] = mesh.triangles.empty() ? Vec3f{} : mesh.positions[mesh.triangles[0].x];
+    mesh.positions.reserve(vertices + 1);
+    return repair;
+}
+
+void recentre(Scene& scene) {
+    const Bounds3d bounds = scene_bounds(scene);
+    if (bounds.empty()) return;
+    const Vec3d center = bounds.center();
+    const double diagonal = bounds.diagonal();
+    if (!(length(center) > 16 * diagonal)) return;
+    scene.origin = scene.origin + center;
+    for (Part& part : scene.parts) part.world_from_mesh.p = part.world_from_mesh.p - center;
+    for (Light& light : scene.lights) light.position = Vec3f(Vec3d(light.position) - center);
+    for (FileCamera& camera : scene.cameras) camera.world_from_camera.p = camera.world_from_camera.p - center;
+}
+
+void assign_paths(Scene& scene, const std::vector<std::vector<std::string>>& chains) {
+    // Ancestors are told apart by the readers (they number repeated groups themselves); here
+    // only whole paths that are still equal get their number.
+    std::unordered_map<std::string, std::uint32_t> seen;
+    std::vector<std::string> paths(scene.parts.size());
+    for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+        for (const std::string& segment : chains[i]) {
+            if (!paths[i].empty()) paths[i] += '/';
+            paths[i] += segment;
+        }
+        ++seen[paths[i]];
+    }
+    std::unordered_map<std::string, std::uint32_t> next;
+    std::unordered_map<std::string, bool> taken;
+    for (const std::string& p : paths)
+        if (seen[p] == 1 && !p.empty()) taken[p] = true;
+    for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+        if (seen[paths[i]] == 1 && !paths[i].empty()) {
+            scene.parts[i].path = paths[i];
+            continue;
+        }
+        std::string unique;
+        do unique = paths[i] + '[' + std::to_string(next[paths[i]]++) + ']';
+        while (!taken.emplace(unique, true).second);
+        scene.parts[i].path = std::move(unique);
+    }
+}
+
+} // namespace porthole
