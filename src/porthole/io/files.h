@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -12,8 +13,11 @@ namespace porthole {
 /// A whole file, mapped read-only (regular files) or read into memory (pipes). Move-only.
 class FileBytes {
 public:
-    /// @throws Error input E0201 not found, E0202 unreadable or a folder, E0203 empty.
-    explicit FileBytes(const std::filesystem::path& path);
+    /// "-" is standard input. Files up to 64 MB are copied, larger ones mapped.
+    /// @param max_bytes  most that is read from a pipe.
+    /// @throws Error input E0201 not found, E0202 unreadable, a folder or a device, E0203
+    ///         empty; limit E0902 when a pipe brings more than `max_bytes`.
+    explicit FileBytes(const std::filesystem::path& path, std::uint64_t max_bytes = std::uint64_t(16) << 30);
     /// Bytes already in memory.
     explicit FileBytes(std::string bytes);
     FileBytes(FileBytes&&) noexcept;
@@ -34,13 +38,17 @@ private:
 /// names, if it is an existing regular file in the model's folder or below, after resolving
 /// symbolic links.
 /// @throws Error input E0210 when it leaves the folder, is absolute, names a scheme or a
-///         device; E0211 when it does not exist. `where` is filled by the caller's text.
+///         device, or the model is "-"; E0211 when it does not exist. `where` becomes the
+///         error's.
 [[nodiscard]] std::filesystem::path resolve_beside(const std::filesystem::path& model, std::string_view reference,
                                                    const std::string& where);
 
 /// Writes `bytes` to a temporary name in the same folder, syncs and renames over `path`.
-/// "-" writes to standard output. A failure leaves what was there before.
-/// @throws Error output E0801 (cannot create), E0802 (write failed, e.g. disk full), E0803 (rename).
+/// "-" writes to standard output; devices and pipes are written directly, a symbolic link
+/// stays and its file is replaced. A failure leaves what was there before.
+/// @param no_clobber  never replace an existing file, decided atomically with the renaming.
+/// @throws Error output E0801 (cannot create), E0802 (write failed, e.g. disk full), E0803
+///         (rename, or the file exists and `no_clobber`).
 void write_file(const std::string& path, std::span<const std::byte> bytes, bool no_clobber = false);
 
 /// `text` with invalid UTF-8 sequences replaced by U+FFFD.
