@@ -22,7 +22,8 @@ endmacro()
 # Flags that every file of this project is compiled with; not exported.
 add_library(porthole_flags INTERFACE)
 target_compile_options(porthole_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
-                       $<$<BOOL:${PORTHOLE_WERROR}>:-Werror> -ffp-contract=off -mavx2 -mno-fma)
+                       $<$<BOOL:${PORTHOLE_WERROR}>:-Werror> -ffp-contract=off -mavx2 -mno-fma
+                       -fno-semantic-interposition)
 if(PORTHOLE_SANITIZE)
   target_compile_options(porthole_flags INTERFACE -fsanitize=${PORTHOLE_SANITIZE} -fno-omit-frame-pointer
                          -fno-sanitize-recover=all)
@@ -37,8 +38,52 @@ function(porthole_folder name)
   add_library(porthole_${name} OBJECT ${arg_SOURCES})
   set_target_properties(porthole_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   target_include_directories(porthole_${name} PUBLIC ${PROJECT_SOURCE_DIR}/src)
+  set_property(GLOBAL APPEND PROPERTY PORTHOLE_FOLDERS porthole_${name})
+  set_property(GLOBAL APPEND PROPERTY PORTHOLE_LIBRARIES ${arg_LIBRARIES})
   list(TRANSFORM arg_FOLDERS PREPEND porthole_)
   target_link_libraries(porthole_${name} PUBLIC ${arg_FOLDERS} ${arg_LIBRARIES} PRIVATE $<BUILD_INTERFACE:porthole_flags>)
+endfunction()
+
+# porthole_library(HEADERS ...)
+# The one library that users link: the objects of every porthole_folder before it. What they
+# link is private: the installed shared library needs nothing but the given headers.
+function(porthole_library)
+  cmake_parse_arguments(arg "" "" "HEADERS" ${ARGN})
+  get_property(folders GLOBAL PROPERTY PORTHOLE_FOLDERS)
+  get_property(libraries GLOBAL PROPERTY PORTHOLE_LIBRARIES)
+  list(REMOVE_DUPLICATES libraries)
+  list(FILTER libraries EXCLUDE REGEX "^nlohmann_json") # headers only: nothing to link
+
+  add_library(porthole)
+  add_library(porthole::porthole ALIAS porthole)
+  foreach(folder ${folders})
+    target_sources(porthole PRIVATE $<TARGET_OBJECTS:${folder}>)
+  endforeach()
+  target_sources(porthole PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}/src FILES ${arg_HEADERS})
+  target_compile_features(porthole PUBLIC cxx_std_20)
+  target_link_libraries(porthole PRIVATE ${libraries} $<BUILD_INTERFACE:porthole_flags>)
+  set_target_properties(porthole PROPERTIES LINKER_LANGUAGE CXX VERSION ${PROJECT_VERSION}
+                        SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  if(PORTHOLE_INSTALL)
+    porthole_install()
+  endif()
+endfunction()
+
+# Installs the library and its headers, and the package that find_package(porthole) finds.
+function(porthole_install)
+  include(GNUInstallDirs)
+  include(CMakePackageConfigHelpers)
+  set(package ${CMAKE_INSTALL_LIBDIR}/cmake/porthole)
+  install(TARGETS porthole EXPORT porthole-targets FILE_SET HEADERS)
+  install(EXPORT porthole-targets NAMESPACE porthole:: DESTINATION ${package})
+  get_target_property(PORTHOLE_LIBRARY_TYPE porthole TYPE)
+  configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/porthole-config.cmake.in
+                                ${PROJECT_BINARY_DIR}/porthole-config.cmake INSTALL_DESTINATION ${package})
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/porthole-config-version.cmake
+                                   COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/porthole-config.cmake ${PROJECT_BINARY_DIR}/porthole-config-version.cmake
+          DESTINATION ${package})
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 endfunction()
 
 # porthole_test(NAME SOURCES ... [FOLDERS ...] [LIBRARIES ...] [LABELS ...])

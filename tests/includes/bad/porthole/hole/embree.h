@@ -1,0 +1,2 @@
+// One fault: only trace may see Embree.
+#include <embree3/rtcore.h>
