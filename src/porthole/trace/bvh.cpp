@@ -111,6 +111,7 @@ struct QueryContext {
     const Bvh::State* bvh = nullptr;
     const Cut* cut = nullptr;
     Vec3f* transmittance = nullptr;
+    bool tinted_blocks = false; ///< blended and transmissive surfaces stop rays, as they do for ids
     detail::VisitCrossing visit_call = nullptr;
     void* visit = nullptr;
     float org_x[kLanes], org_y[kLanes], org_z[kLanes]; ///< world rays: Embree transforms its own in place
@@ -183,7 +184,7 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
             args->valid[i] = 0;
             continue;
         }
-        if (kind == SurfaceKind::tinted) {
+        if (kind == SurfaceKind::tinted && !query.tinted_blocks) {
             const Mesh& mesh = scene.mesh_of(c.part);
             const Material& material = scene.materials[mesh.material_of(c.triangle)];
             if (material.alpha_mode != AlphaMode::blend && !(material.transmission > 0)) continue;
@@ -357,6 +358,14 @@ void occluded(const Bvh& bvh, RayHit16& rays, const Cut* cut, Vec3f* transmittan
         query.keep_world_rays(rays);
     }
     query.transmittance = transmittance;
+    rtcOccluded16(valid, bvh.state().top.value, &query.rtc, reinterpret_cast<RTCRay16*>(&rays));
+}
+
+void occluded_by_any(const Bvh& bvh, RayHit16& rays) {
+    alignas(64) int valid[kLanes];
+    if (!active_lanes(rays, valid)) return;
+    QueryContext query = make_context(bvh, Coherence::incoherent);
+    query.tinted_blocks = true;
     rtcOccluded16(valid, bvh.state().top.value, &query.rtc, reinterpret_cast<RTCRay16*>(&rays));
 }
 

@@ -111,6 +111,9 @@ void intersect(const Bvh& bvh, RayHit16& rays, Coherence coherence);
 /// Incoherent always: coherent occlusion packets on instances did not return (docs/decisions).
 void occluded(const Bvh& bvh, RayHit16& rays, const Cut* cut, Vec3f* transmittance);
 
+/// Coverage query: lanes that meet any surface, of whatever material, get tfar = -infinity.
+void occluded_by_any(const Bvh& bvh, RayHit16& rays);
+
 /// Calls visit(lane, part, t) for every surface that the active lanes cross between tnear and
 /// tfar, in no particular order but the same every time. Alpha-masked texels are no surface.
 /// `rays` keeps its tfar.

@@ -1,0 +1,354 @@
+#include "porthole/trace/visibility.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+namespace porthole {
+
+namespace {
+
+constexpr int kTile = 64;
+
+int floor_div4(int a) { return a >> 2; } // arithmetic shift: rounds down for negative pixels too
+
+/// Calls body(x0, y0) for the 4x4 blocks, aligned to multiples of 4, that meet `tile`.
+template <typename Body> void for_each_block(Rect tile, Body&& body) {
+    for (int by = floor_div4(tile.y0); 4 * by < tile.y1; ++by)
+        for (int bx = floor_div4(tile.x0); 4 * bx < tile.x1; ++bx) body(4 * bx, 4 * by);
+}
+
+/// Rays through the centres of a 4x4 block; lane i is pixel (x0 + i % 4, y0 + i / 4). Lanes
+/// outside `window` are inactive.
+/// @return number of active lanes
+int set_block_rays(RayHit16& rays, float (&depth_per_t)[kLanes], const View& view, int x0, int y0, Rect window,
+                   std::uint32_t mask = kMaskAll) {
+    int active = 0;
+    for (int i = 0; i < kLanes; ++i) {
+        const int x = x0 + (i & 3), y = y0 + (i >> 2);
+        if (!window.contains(x, y)) {
+            rays.clear(i);
+            continue;
+        }
+        const Ray ray = view.ray(float(x) + 0.5f, float(y) + 0.5f);
+        rays.set(i, ray.origin, ray.direction, 0.0f, kInfinity, mask);
+        depth_per_t[i] = ray.depth_per_t;
+        ++active;
+    }
+    return active;
+}
+
+void store_ids(const RayHit16& rays, const float (&depth_per_t)[kLanes], int x0, int y0, IdBuffer& ids) {
+    for (int i = 0; i < kLanes; ++i) {
+        if (!rays.hit(i)) continue;
+        const int x = x0 + (i & 3), y = y0 + (i >> 2);
+        ids.id(x, y) = rays.part(i);
+        ids.depth(x, y) = rays.tfar[i] * depth_per_t[i];
+    }
+}
+
+void add(std::int64_t* rays, const std::atomic<std::int64_t>& n) {
+    if (rays) *rays += n.load();
+}
+
+/// Sixteen bits of a coordinate spread to every third bit.
+std::uint32_t spread(std::uint32_t v) {
+    v = (v | (v << 16)) & 0x030000FFu;
+    v = (v | (v << 8)) & 0x0300F00Fu;
+    v = (v | (v << 4)) & 0x030C30C3u;
+    return (v | (v << 2)) & 0x09249249u;
+}
+
+std::vector<Bounds3f> boxes_of(const Mesh& mesh) {
+    constexpr std::size_t kCluster = 64;
+    const std::size_t n = mesh.triangles.size();
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> order(n);
+    const Vec3f size = mesh.bounds.size();
+    const auto cell = [](float v, float lower, float extent) {
+        return extent > 0 ? std::uint32_t(std::clamp((v - lower) / extent, 0.0f, 1.0f) * 1023.0f) : 0u;
+    };
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const Vec3u t = mesh.triangles[i];
+        const Vec3f c = mesh.positions[t.x] / 3.0f + mesh.positions[t.y] / 3.0f + mesh.positions[t.z] / 3.0f;
+        order[i] = {spread(cell(c.x, mesh.bounds.lower.x, size.x)) |
+                        spread(cell(c.y, mesh.bounds.lower.y, size.y)) << 1 |
+                        spread(cell(c.z, mesh.bounds.lower.z, size.z)) << 2,
+                    i};
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<Bounds3f> boxes((n + kCluster - 1) / kCluster);
+    for (std::size_t k = 0; k < n; ++k) {
+        const Vec3u t = mesh.triangles[order[k].second];
+        for (const std::uint32_t v : {t.x, t.y, t.z}) boxes[k / kCluster].extend(mesh.positions[v]);
+    }
+    return boxes;
+}
+
+/// Pixel rectangle that a box covers, one pixel more on each side; empty when it lies behind
+/// the eye; `window` when it reaches the eye's plane and no finite rectangle bounds it.
+Rect projected_rect(const Bounds3f& box, const Affine3d& camera_from_mesh, const View& view, Rect window) {
+    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300;
+    double nearest = 1e300, farthest = -1e300;
+    Vec3d corners[8];
+    for (int i = 0; i < 8; ++i) {
+        corners[i] = camera_from_mesh.point(Vec3d(box.corner(i)));
+        nearest = std::min(nearest, -corners[i].z);
+        farthest = std::max(farthest, -corners[i].z);
+    }
+    const double scale = view.pixel_scale();
+    if (!view.orthographic) {
+        if (farthest < 0) return {};
+        if (!(nearest > 1e-4 * farthest)) return window;
+    }
+    for (const Vec3d& c : corners) {
+        const double s = 1.0 / (view.orthographic ? scale : scale * -c.z);
+        const double x = 0.5 * view.width + c.x * s, y = 0.5 * view.height - c.y * s;
+        x0 = std::min(x0, x), x1 = std::max(x1, x);
+        y0 = std::min(y0, y), y1 = std::max(y1, y);
+    }
+    const auto pixel = [](double v) { return int(std::clamp(std::floor(v), -1e9, 1e9)); };
+    return Rect{pixel(x0) - 1, pixel(y0) - 1, pixel(x1) + 2, pixel(y1) + 2}.intersected(window);
+}
+
+} // namespace
+
+IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
+    IdBuffer ids(window);
+    std::atomic<std::int64_t> traced{0};
+    parallel_for_tiles(window, kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        std::int64_t n = 0;
+        for_each_block(tile, [&](int x0, int y0) {
+            n += set_block_rays(packet, depth_per_t, view, x0, y0, tile);
+            intersect(bvh, packet, Coherence::coherent);
+            store_ids(packet, depth_per_t, x0, y0, ids);
+        });
+        traced += n;
+    });
+    add(rays, traced);
+    return ids;
+}
+
+ClusterBoxes cluster_boxes(const Scene& scene, std::span<const PartId> parts, const Control& control) {
+    ClusterBoxes boxes;
+    boxes.by_mesh.resize(scene.meshes.size());
+    std::vector<std::uint32_t> meshes;
+    for (const PartId id : parts) meshes.push_back(scene.parts[index(id)].mesh);
+    std::sort(meshes.begin(), meshes.end());
+    meshes.erase(std::unique(meshes.begin(), meshes.end()), meshes.end());
+    parallel_for(meshes.size(), control,
+                 [&](std::size_t i) { boxes.by_mesh[meshes[i]] = boxes_of(scene.meshes[meshes[i]]); });
+    return boxes;
+}
+
+std::int64_t BlockMask::count() const {
+    return std::count(marked.pixels().begin(), marked.pixels().end(), std::uint8_t{1});
+}
+
+BlockMask mark_blocks(const Scene& scene, std::span<const PartId> parts, const ClusterBoxes& boxes, const View& view,
+                      Rect window) {
+    BlockMask mask;
+    mask.blocks = {floor_div4(window.x0), floor_div4(window.y0), floor_div4(window.x1 - 1) + 1,
+                   floor_div4(window.y1 - 1) + 1};
+    mask.marked = Mask(mask.blocks, 0);
+    const Affine3d camera_from_world = inverse(Affine3d(view.world_from_camera));
+    for (const PartId id : parts) {
+        const Part& part = scene.parts[index(id)];
+        const Affine3d camera_from_mesh = camera_from_world * part.world_from_mesh;
+        for (const Bounds3f& box : boxes.by_mesh[part.mesh]) {
+            const Rect r = projected_rect(box, camera_from_mesh, view, window);
+            if (r.empty()) continue;
+            for (int by = floor_div4(r.y0); by <= floor_div4(r.y1 - 1); ++by)
+                std::fill_n(&mask.marked(floor_div4(r.x0), by), floor_div4(r.x1 - 1) - floor_div4(r.x0) + 1,
+                            std::uint8_t{1});
+        }
+    }
+    return mask;
+}
+
+IdBuffer trace_ids_in_blocks(const Bvh& bvh, const View& view, Rect window, const BlockMask& blocks,
+                             const Control& control, std::int64_t* rays) {
+    IdBuffer ids(window);
+    std::atomic<std::int64_t> traced{0};
+    parallel_for_tiles(window, kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        std::int64_t n = 0;
+        for_each_block(tile, [&](int x0, int y0) {
+            if (!blocks.marked(floor_div4(x0), floor_div4(y0))) return;
+            n += set_block_rays(packet, depth_per_t, view, x0, y0, tile);
+            intersect(bvh, packet, Coherence::coherent);
+            store_ids(packet, depth_per_t, x0, y0, ids);
+        });
+        traced += n;
+    });
+    add(rays, traced);
+    return ids;
+}
+
+std::vector<PartId> trace_ids_at(const Bvh& bvh, const View& view, std::span<const Vec2i> pixels) {
+    const FlushDenormals flush;
+    std::vector<PartId> ids(pixels.size(), kNoPart);
+    RayHit16 packet;
+    for (std::size_t first = 0; first < pixels.size(); first += kLanes) {
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            if (first + i >= pixels.size()) {
+                packet.clear(int(i));
+                continue;
+            }
+            const Vec2i p = pixels[first + i];
+            const Ray ray = view.ray(float(p.x) + 0.5f, float(p.y) + 0.5f);
+            packet.set(int(i), ray.origin, ray.direction, 0.0f, kInfinity);
+        }
+        intersect(bvh, packet, Coherence::incoherent);
+        for (std::size_t i = 0; i < kLanes && first + i < pixels.size(); ++i)
+            if (packet.hit(int(i))) ids[first + i] = packet.part(int(i));
+    }
+    return ids;
+}
+
+Spans trace_spans(const Bvh& bvh, std::uint32_t mask, const View& view, const IdBuffer& targets, float tolerance,
+                  const Control& control, std::int64_t* rays) {
+    Spans spans;
+    spans.nearest = Image<float>(targets.window(), kInfinity);
+    std::vector<std::atomic<std::int64_t>> pixels(bvh.scene().parts.size());
+    // Depth gaps are not negative, so their bits order as integers.
+    std::vector<std::atomic<std::uint32_t>> gaps(bvh.scene().parts.size());
+    std::atomic<std::int64_t> traced{0};
+
+    parallel_for_tiles(targets.window(), kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes], depth[kLanes];
+        std::vector<std::pair<PartId, int>> met; // part and lane, each pair once
+        std::int64_t n = 0;
+        for_each_block(tile, [&](int x0, int y0) {
+            bool any = false;
+            set_block_rays(packet, depth_per_t, view, x0, y0, tile, mask);
+            for (int i = 0; i < kLanes; ++i) {
+                if (!packet.active(i)) continue;
+                const int x = x0 + (i & 3), y = y0 + (i >> 2);
+                if (targets.id(x, y) == kNoPart) {
+                    packet.clear(i);
+                    continue;
+                }
+                depth[i] = targets.depth(x, y);
+                const float clear = std::max(tolerance, depth[i] * 8 * std::numeric_limits<float>::epsilon());
+                packet.tfar[i] = (depth[i] - clear) / depth_per_t[i];
+                any |= packet.active(i);
+                ++n;
+            }
+            if (!any) return;
+            met.clear();
+            for_each_crossing(bvh, packet, [&](int lane, PartId part, float t) {
+                const float d = t * depth_per_t[lane];
+                float& nearest = spans.nearest(x0 + (lane & 3), y0 + (lane >> 2));
+                nearest = std::min(nearest, d);
+                const std::uint32_t gap = std::bit_cast<std::uint32_t>(std::max(0.0f, depth[lane] - d));
+                std::atomic<std::uint32_t>& greatest = gaps[index(part)];
+                std::uint32_t seen = greatest.load(std::memory_order_relaxed);
+                while (seen < gap && !greatest.compare_exchange_weak(seen, gap, std::memory_order_relaxed)) {}
+                met.emplace_back(part, lane);
+            });
+            std::sort(met.begin(), met.end());
+            met.erase(std::unique(met.begin(), met.end()), met.end());
+            for (const auto& [part, lane] : met) pixels[index(part)].fetch_add(1, std::memory_order_relaxed);
+        });
+        traced += n;
+    });
+
+    for (std::uint32_t i = 0; i < pixels.size(); ++i)
+        if (const std::int64_t n = pixels[i].load(); n > 0)
+            spans.parts.push_back({PartId{i}, n, std::bit_cast<float>(gaps[i].load())});
+    add(rays, traced);
+    return spans;
+}
+
+Mask trace_coverage(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
+    Mask hit(window, 0);
+    std::atomic<std::int64_t> traced{0};
+    parallel_for_tiles(window, kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        std::int64_t n = 0;
+        for_each_block(tile, [&](int x0, int y0) {
+            n += set_block_rays(packet, depth_per_t, view, x0, y0, tile);
+            occluded_by_any(bvh, packet);
+            for (int i = 0; i < kLanes; ++i)
+                if (packet.tfar[i] == -kInfinity && packet.tnear[i] == 0) hit(x0 + (i & 3), y0 + (i >> 2)) = 1;
+        });
+        traced += n;
+    });
+    add(rays, traced);
+    return hit;
+}
+
+Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& limit,
+                            const Control& control, std::int64_t* rays) {
+    Image<float> farthest(mask.window(), -kInfinity);
+    std::atomic<std::int64_t> traced{0};
+    parallel_for_tiles(mask.window(), kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        std::int64_t n = 0;
+        for_each_block(tile, [&](int x0, int y0) {
+            bool any = false;
+            set_block_rays(packet, depth_per_t, view, x0, y0, tile);
+            for (int i = 0; i < kLanes; ++i) {
+                if (!packet.active(i)) continue;
+                const int x = x0 + (i & 3), y = y0 + (i >> 2);
+                if (!mask(x, y)) {
+                    packet.clear(i);
+                    continue;
+                }
+                packet.tfar[i] = limit(x, y) / depth_per_t[i];
+                any |= packet.active(i);
+                ++n;
+            }
+            if (!any) return;
+            for_each_crossing(bvh, packet, [&](int lane, PartId, float t) {
+                float& d = farthest(x0 + (lane & 3), y0 + (lane >> 2));
+                d = std::max(d, t * depth_per_t[lane]);
+            });
+        });
+        traced += n;
+    });
+    add(rays, traced);
+    return farthest;
+}
+
+FineCoverage trace_fine(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
+    FineCoverage fine;
+    fine.hits = Image<std::uint16_t>(window, 0);
+    fine.depth = Image<float>(window, kInfinity);
+    std::atomic<std::int64_t> samples{0};
+    parallel_for_tiles(window, kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        std::int64_t n = 0;
+        for (int y = tile.y0; y < tile.y1; ++y)
+            for (int x = tile.x0; x < tile.x1; ++x) {
+                for (int i = 0; i < kLanes; ++i) {
+                    const Vec2f p = fine_position(x, y, i);
+                    const Ray ray = view.ray(p.x, p.y);
+                    packet.set(i, ray.origin, ray.direction, 0.0f, kInfinity);
+                    depth_per_t[i] = ray.depth_per_t;
+                }
+                intersect(bvh, packet, Coherence::coherent);
+                for (int i = 0; i < kLanes; ++i) {
+                    if (!packet.hit(i)) continue;
+                    fine.hits(x, y) = std::uint16_t(fine.hits(x, y) | 1u << i);
+                    fine.depth(x, y) = std::min(fine.depth(x, y), packet.tfar[i] * depth_per_t[i]);
+                    ++n;
+                }
+            }
+        samples += n;
+    });
+    fine.samples = samples;
+    if (rays) *rays += std::int64_t(window.width()) * window.height() * kLanes;
+    return fine;
+}
+
+} // namespace porthole
