@@ -1,4 +1,6 @@
 # cmake -D TYPE=static|shared ... -P check_package.cmake: see CMakeLists.txt beside it.
+cmake_minimum_required(VERSION 3.25)
+
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT code EQUAL 0)
