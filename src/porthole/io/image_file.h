@@ -7,24 +7,45 @@
 #include <string>
 #include <vector>
 
+#include "porthole/base/error.h"
 #include "porthole/base/image.h"
 
 namespace porthole {
 
+enum class ImageKind : std::uint8_t { png, jpeg, webp };
+
+struct ImageInfo {
+    ImageKind kind = ImageKind::png;
+    std::int32_t width = 0, height = 0;
+};
+
+/// What the header says, before anything is allocated; the same limits as decode_image.
+/// @throws Error input E0701, E0702; limit E0901.
+[[nodiscard]] ImageInfo image_info(std::span<const std::byte> bytes, const std::string& where);
+
 /// Decodes a PNG, JPEG or WebP picture, told apart by its first bytes, to sRGB-encoded RGBA8
-/// with straight alpha.
-/// @param where  the file and place that errors name.
-/// @throws Error input E0701 (unknown or unsupported kind), E0702 (broken), limit E0901
-///         (more than 16384 pixels on a side or 2^28 in all: checked from the header first).
+/// with straight alpha. Colour profiles and orientation tags are not applied, as glTF asks.
+/// @param where     the file and place that errors name.
+/// @param warnings  receives what is odd in a picture that is nevertheless whole (W0703:
+///                  damaged metadata, stray bytes).
+/// @throws Error input E0701 (unknown or unsupported kind), E0702 (broken or cut short), limit
+///         E0901 (more than 16384 pixels on a side or 2^28 in all: checked from the header
+///         first).
 /// Safe to call concurrently.
-[[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& where);
+[[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& where,
+                                        Warnings* warnings = nullptr);
 
 /// PNG of straight-alpha sRGB pixels. `channels` 3 drops alpha. Same bytes every time.
+/// @throws Error output E0804 when the image is empty or too large for a PNG.
 [[nodiscard]] std::vector<std::byte> encode_png(const Image<Rgba8>& image, int channels);
-/// 16-bit PNG; `rgba` holds width*height*channels native-endian samples, sRGB-encoded.
+/// 16-bit PNG; `samples` holds width*height*channels native-endian values, sRGB-encoded, row
+/// by row; `channels` 1 (grey), 3 or 4.
+/// @throws Error output E0804 as encode_png, or when the sizes do not agree.
 [[nodiscard]] std::vector<std::byte> encode_png16(std::span<const std::uint16_t> samples, int width, int height,
                                                   int channels);
 /// JPEG 4:4:4 (alpha dropped), quality 1..100.
+/// @throws Error output E0804 when the image is empty, above 65535 pixels on a side, or
+///         `quality` is out of range.
 [[nodiscard]] std::vector<std::byte> encode_jpeg(const Image<Rgba8>& image, int quality = 92);
 
 } // namespace porthole
