@@ -1,0 +1,310 @@
+#include "porthole/plan.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+namespace porthole {
+
+namespace {
+
+constexpr int kThinPixels = 16; ///< fewer pixel centres than this: sub-pixel samples decide
+
+/// Smallest rectangle around the non-zero pixels; empty if there are none.
+template <typename T, typename Set> Rect bounding_rect(const Image<T>& image, Set&& set) {
+    const Rect w = image.window();
+    Rect r{w.x1, w.y1, w.x0, w.y0};
+    for (int y = w.y0; y < w.y1; ++y)
+        for (int x = w.x0; x < w.x1; ++x)
+            if (set(image(x, y))) {
+                r.x0 = std::min(r.x0, x), r.x1 = std::max(r.x1, x + 1);
+                r.y0 = std::min(r.y0, y), r.y1 = std::max(r.y1, y + 1);
+            }
+    return r.x0 < r.x1 ? r : Rect{};
+}
+
+template <typename T> Image<T> cropped(const Image<T>& image, Rect window) {
+    if (window == image.window()) return image;
+    Image<T> out(window);
+    for (int y = window.y0; y < window.y1; ++y)
+        std::copy_n(&image(window.x0, y), window.width(), out.row(y));
+    return out;
+}
+
+/// Pixels that the marked blocks cover.
+Rect pixel_rect(const BlockMask& blocks, Rect window) {
+    const Rect b = bounding_rect(blocks.marked, [](std::uint8_t v) { return v != 0; });
+    if (b.empty()) return {};
+    return Rect{4 * b.x0, 4 * b.y0, 4 * b.x1, 4 * b.y1}.intersected(window);
+}
+
+/// Where `part` alone is seen; thin parts by sub-pixel samples.
+TargetView view_target(const Subject& subject, const View& view, Rect window, PartId part, const Control& control,
+                       std::int64_t& rays) {
+    TargetView target;
+    target.part = part;
+    const std::array<PartId, 1> one{part};
+    const Bvh bvh = build_bvh(*subject.meshes, one);
+    const BlockMask blocks = mark_blocks(subject.scene(), one, subject.boxes, view, window);
+    const Rect box = pixel_rect(blocks, window);
+    target.alone = Mask(box, 0);
+    if (box.empty()) {
+        target.absent = true;
+        return target;
+    }
+    const IdBuffer ids = trace_ids_in_blocks(bvh, view, box, blocks, control, &rays);
+    const auto count = [&] {
+        target.pixels_alone = target.pixels_outside = 0;
+        for (int y = box.y0; y < box.y1; ++y)
+            for (int x = box.x0; x < box.x1; ++x)
+                if (target.alone(x, y)) ++(view.window().contains(x, y) ? target.pixels_alone : target.pixels_outside);
+    };
+    for (std::size_t i = 0; i < ids.id.pixels().size(); ++i) target.alone.pixels()[i] = ids.id.pixels()[i] == part;
+    count();
+    if (target.pixels_alone + target.pixels_outside >= kThinPixels) {
+        target.absent = target.pixels_alone == 0;
+        return target;
+    }
+    const FineCoverage fine = trace_fine(bvh, view, box, control, &rays);
+    target.thin = true;
+    for (int y = box.y0; y < box.y1; ++y)
+        for (int x = box.x0; x < box.x1; ++x) {
+            target.alone(x, y) = fine.hits(x, y) != 0;
+            if (view.window().contains(x, y)) target.fine_samples += std::popcount(fine.hits(x, y));
+        }
+    count();
+    target.absent = target.pixels_alone == 0;
+    return target;
+}
+
+/// Adds the sub-pixel samples of thin targets to the group's id buffer.
+void add_thin_targets(const Subject& subject, const View& view, std::span<const TargetView> targets,
+                      std::span<const PartId> opened, IdBuffer& ids, const Control& control, std::int64_t& rays) {
+    for (const TargetView& target : targets) {
+        if (!target.thin || !std::binary_search(opened.begin(), opened.end(), target.part)) continue;
+        const std::array<PartId, 1> one{target.part};
+        const Rect box = target.alone.window().intersected(ids.window());
+        const FineCoverage fine = trace_fine(build_bvh(*subject.meshes, one), view, box, control, &rays);
+        for (int y = box.y0; y < box.y1; ++y)
+            for (int x = box.x0; x < box.x1; ++x)
+                if (fine.hits(x, y) && fine.depth(x, y) < ids.depth(x, y)) {
+                    ids.id(x, y) = target.part;
+                    ids.depth(x, y) = fine.depth(x, y);
+                }
+    }
+}
+
+/// For each target whether another one covers most of it.
+void find_hiding_targets(std::vector<TargetView>& targets, const IdBuffer& ids) {
+    for (TargetView& target : targets) {
+        std::vector<std::pair<PartId, std::int64_t>> hiders;
+        const Rect box = target.alone.window().intersected(ids.window());
+        for (int y = box.y0; y < box.y1; ++y)
+            for (int x = box.x0; x < box.x1; ++x) {
+                const PartId id = ids.id(x, y);
+                if (!target.alone(x, y) || id == target.part || id == kNoPart) continue;
+                const auto it = std::find_if(hiders.begin(), hiders.end(), [&](const auto& h) { return h.first == id; });
+                if (it == hiders.end()) hiders.emplace_back(id, 1);
+                else ++it->second;
+            }
+        for (const auto& [id, n] : hiders)
+            if (2 * n > target.pixels_alone + target.pixels_outside) target.hidden_by = id;
+    }
+}
+
+/// E on `window`: background that reaches the edge of picture and margin is outside, so when
+/// some reaches the edge of `window` the whole of it has to be traced to tell.
+Mask enclosing_object(const Bvh& cut_set, const View& view, Rect window, Rect whole, const Control& control,
+                      std::int64_t& rays) {
+    Mask enclosing = fill_enclosed(trace_coverage(cut_set, view, window, control, &rays));
+    if (window == whole) return enclosing;
+    const std::vector<std::uint8_t>& pixels = enclosing.pixels();
+    if (std::find(pixels.begin(), pixels.end(), std::uint8_t{0}) == pixels.end()) return enclosing;
+    return cropped(fill_enclosed(trace_coverage(cut_set, view, whole, control, &rays)), window);
+}
+
+/// The hole as it acts on rays.
+Cut make_cut(const Subject& subject, const View& view, const Hole& hole, const IdBuffer& targets,
+             std::span<const PartId> cut_set, const Bvh& cut_bvh, HoleStyle style, const Control& control,
+             std::int64_t& rays) {
+    Cut cut;
+    cut.view = view;
+    cut.role = subject.roles;
+    for (CutRole& role : cut.role)
+        if (role == CutRole::cut_set) role = CutRole::loose;
+    for (const PartId id : cut_set) cut.role[index(id)] = CutRole::cut_set;
+
+    cut.distance = hole.distance;
+    cut.cut_depth = hole.floor_depth;
+    cut.loose_depth = Image<float>(hole.window, -kInfinity);
+    if (style == HoleStyle::paper) return cut; // occluders go along the whole ray, nothing else does
+
+    for (std::size_t i = 0; i < targets.id.pixels().size(); ++i)
+        if (targets.id.pixels()[i] != kNoPart) cut.cut_depth.pixels()[i] = targets.depth.pixels()[i];
+    for (std::size_t i = 0; i < hole.mask.pixels().size(); ++i)
+        if (!hole.mask.pixels()[i]) cut.cut_depth.pixels()[i] = -kInfinity;
+    cut.loose_depth = trace_farthest(cut_bvh, view, hole.mask, cut.cut_depth, control, &rays);
+    // The farthest removed point itself is gone; what lies behind it stays.
+    return cut;
+}
+
+/// The targets the paper's follower found; those that step 1 misses are missing.
+PaperContours follow_contours(const Bvh& targets, ViewPlan& plan) {
+    PaperContours paper = find_contours_paper(
+        [&](std::span<const Vec2i> pixels) { return trace_ids_at(targets, plan.view, pixels); }, plan.view.window());
+    plan.rays.paper_step1 += paper.step1_rays;
+    plan.rays.paper_step2 += paper.step2_rays;
+    return paper;
+}
+
+void keep_only(IdBuffer& ids, std::span<const PartId> kept) {
+    for (std::size_t i = 0; i < ids.id.pixels().size(); ++i) {
+        PartId& id = ids.id.pixels()[i];
+        if (id == kNoPart || std::find(kept.begin(), kept.end(), id) != kept.end()) continue;
+        id = kNoPart;
+        ids.depth.pixels()[i] = kInfinity;
+    }
+}
+
+/// Everything of the plan that depends on which targets are opened.
+void plan_opened_group(const Subject& subject, const PlanParams& params, Rect whole, const BlockMask& blocks,
+                       ViewPlan& plan, const Control& control) {
+    const View& view = plan.view;
+    const bool all = plan.opened.size() == subject.targets.size();
+    std::optional<Bvh> some;
+    if (!all) some.emplace(build_bvh(*subject.meshes, plan.opened));
+    const Bvh& bvh = all ? subject.target_bvh : *some;
+
+    if (params.contours == ContourMethod::full) {
+        const IdBuffer ids = trace_ids(bvh, view, whole, control, &plan.rays.targets);
+        plan.target_ids.id = cropped(ids.id, plan.window);
+        plan.target_ids.depth = cropped(ids.depth, plan.window);
+    } else {
+        plan.target_ids = trace_ids_in_blocks(bvh, view, plan.window, blocks, control, &plan.rays.targets);
+    }
+    add_thin_targets(subject, view, plan.targets, plan.opened, plan.target_ids, control, plan.rays.targets);
+
+    PaperContours paper;
+    if (params.contours == ContourMethod::paper || params.style == HoleStyle::paper) paper = follow_contours(bvh, plan);
+    if (params.contours == ContourMethod::paper) {
+        keep_only(plan.target_ids, paper.ids);
+        plan.contours = paper.contours;
+    } else {
+        plan.contours = find_contours(plan.target_ids.id);
+    }
+    find_hiding_targets(plan.targets, plan.target_ids);
+
+    // What lies in front of the targets is cut; the rest is loose.
+    plan.spans = trace_spans(subject.whole, kMaskCutSet, view, plan.target_ids, subject.tolerance(), control,
+                             &plan.rays.spans);
+    for (const PartSpan& span : plan.spans.parts) plan.cut_set.push_back(span.part);
+    if (plan.cut_set.empty()) return;
+    const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
+    plan.enclosing = enclosing_object(cut_bvh, view, plan.window, whole, control, plan.rays.enclosing);
+
+    if (params.style == HoleStyle::paper) {
+        PaperHole grown = grow_hole_paper(paper, plan.target_ids, plan.enclosing, plan.depth_px);
+        plan.hole = std::move(grown.hole);
+        plan.paper_depth_px.assign(plan.opened.size(), 0);
+        for (const PaperHole::PerTarget& t : grown.targets) {
+            const auto it = std::find(plan.opened.begin(), plan.opened.end(), t.target);
+            if (it != plan.opened.end()) plan.paper_depth_px[std::size_t(it - plan.opened.begin())] = t.depth_px;
+        }
+    } else {
+        Mask covered(plan.window, 0);
+        for (std::size_t i = 0; i < covered.pixels().size(); ++i)
+            covered.pixels()[i] = plan.spans.nearest.pixels()[i] < kInfinity;
+        plan.hole = grow_hole(plan.contours, plan.target_ids, covered, plan.enclosing,
+                              {.depth_px = plan.depth_px, .blur_px = 0.025f * float(view.height)});
+    }
+    plan.cut = make_cut(subject, view, plan.hole, plan.target_ids, plan.cut_set, cut_bvh, params.style, control,
+                        plan.rays.loose);
+}
+
+/// Targets of the opened group that the hole has no room for.
+std::vector<PartId> no_room(const ViewPlan& plan, const PlanParams& params) {
+    if (params.style != HoleStyle::paper) return targets_without_room(plan.hole);
+    std::vector<PartId> refused;
+    for (std::size_t i = 0; i < plan.opened.size(); ++i)
+        if (plan.paper_depth_px[i] == 0) refused.push_back(plan.opened[i]);
+    return refused;
+}
+
+} // namespace
+
+Subject make_subject(const MeshBvhs& meshes, std::span<const PartId> targets, std::span<const PartId> keep,
+                     std::span<const PartId> cut_only, const Control& control) {
+    const Scene& scene = meshes.scene();
+    std::vector<CutRole> roles(scene.parts.size(), cut_only.empty() ? CutRole::cut_set : CutRole::fixed);
+    for (const PartId id : cut_only) roles[index(id)] = CutRole::cut_set;
+    for (const PartId id : keep) roles[index(id)] = CutRole::fixed;
+    for (const PartId id : targets) roles[index(id)] = CutRole::fixed;
+    std::vector<PartId> sorted(targets.begin(), targets.end());
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+
+    Bvh whole = build_bvh(meshes, all_parts(scene), roles);
+    Bvh target_bvh = build_bvh(meshes, sorted);
+    ClusterBoxes boxes = cluster_boxes(scene, sorted, control);
+    return {&meshes, std::move(sorted), std::move(roles), std::move(whole), std::move(target_bvh),
+            std::move(boxes), scene_bounds(scene)};
+}
+
+int band_depth_px(const Subject& subject, const View& view, const PlanParams& params) {
+    const Length depth = params.depth.value_or(params.style == HoleStyle::paper ? Length{Length::Unit::pixel, 4}
+                                                                               : Length{});
+    double px = depth.value;
+    if (depth.unit == Length::Unit::percent) px = depth.value / 100 * view.height;
+    if (depth.unit == Length::Unit::millimetre) {
+        Bounds3d box;
+        for (const PartId id : subject.targets) box.extend(part_bounds(subject.scene(), id));
+        const float z = box.empty() ? 1.0f : view.project(Vec3f(box.center())).depth;
+        px = depth.value / 1000 / double(view.pixel_size(std::max(z, 1e-30f)));
+    }
+    if (!(px > 0) || !(px <= 4096))
+        throw Error(ErrorKind::usage, "E0120", "--depth",
+                    "the band would be " + std::to_string(px) + " px wide; it must be above 0 and at most 4096 px");
+    return std::max(1, int(std::lround(px)));
+}
+
+ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params, const Control& control) {
+    const Scene& scene = subject.scene();
+    ViewPlan plan;
+    plan.view = view;
+    plan.depth_px = band_depth_px(subject, view, params);
+    const int margin = 3 * plan.depth_px + 1;
+    const Rect whole = view.window().grown(margin);
+
+    // Each target alone, then all of them together.
+    const BlockMask blocks = mark_blocks(scene, subject.targets, subject.boxes, view, whole);
+    for (const PartId id : subject.targets)
+        plan.targets.push_back(view_target(subject, view, whole, id, control, plan.rays.alone));
+    for (const TargetView& target : plan.targets)
+        if (!target.absent) plan.opened.push_back(target.part);
+    const Rect touched = pixel_rect(blocks, whole);
+    plan.window = touched.empty() ? Rect{} : touched.grown(margin).intersected(whole);
+    if (plan.opened.empty()) return plan;
+
+    // A target that has no room is taken out of the group, and the rest is planned again:
+    // what it covered may have become visible, what only it needed stays whole.
+    for (;;) {
+        plan_opened_group(subject, params, whole, blocks, plan, control);
+        if (params.tight == Tight::open || plan.hole.empty()) return plan;
+        std::vector<PartId> refused = no_room(plan, params);
+        if (refused.empty()) return plan;
+        for (TargetView& target : plan.targets)
+            if (std::find(refused.begin(), refused.end(), target.part) != refused.end()) {
+                target.refused = true;
+                std::erase(plan.opened, target.part);
+            }
+        plan.contours.clear();
+        plan.cut_set.clear();
+        plan.spans = {};
+        plan.hole = {};
+        plan.cut = {};
+        if (plan.opened.empty()) return plan;
+    }
+}
+
+} // namespace porthole

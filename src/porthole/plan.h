@@ -1,0 +1,115 @@
+// The plan of a view: which pixels the targets fill, what hides them, the hole through it and
+// how deep it goes. One value, made by one function, for every caller that looks at a view.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "porthole/base/cut.h"
+#include "porthole/hole/hole.h"
+#include "porthole/scene/scene.h"
+#include "porthole/trace/bvh.h"
+#include "porthole/trace/visibility.h"
+
+namespace porthole {
+
+enum class ContourMethod : std::uint8_t {
+    exact, ///< targets traced in the blocks their boxes touch; equals `full` on every view
+    full,  ///< every pixel traced against the targets: the oracle
+    paper  ///< contours followed as the paper does; targets that step 1 misses are missed
+};
+
+enum class HoleStyle : std::uint8_t {
+    hole, ///< straight walls, width clamped at every contour pixel
+    paper ///< N_k, P_k, F_k, one width per target, flat shading
+};
+
+enum class Tight : std::uint8_t {
+    refuse, ///< a target without room stays closed, and the report says so
+    open    ///< it is opened all the same
+};
+
+/// A length as users give it: "54px", "5%" of the picture's height, "3mm" at the targets' depth.
+struct Length {
+    enum class Unit : std::uint8_t { pixel, percent, millimetre } unit = Unit::percent;
+    double value = 5;
+};
+
+struct PlanParams {
+    ContourMethod contours = ContourMethod::exact;
+    HoleStyle style = HoleStyle::hole;
+    std::optional<Length> depth; ///< width of the band; unset: 5 % (hole), 4 px (paper)
+    Tight tight = Tight::refuse;
+};
+
+/// What does not depend on the view: who is a target, who may be cut. Move-only; needs its
+/// MeshBvhs alive.
+struct Subject {
+    const MeshBvhs* meshes = nullptr;
+    std::vector<PartId> targets;    ///< increasing
+    std::vector<CutRole> roles;     ///< by part: fixed (targets, kept parts) or cut_set (may be cut)
+    Bvh whole;                      ///< every part, with those roles as masks
+    Bvh target_bvh;                 ///< the targets only
+    ClusterBoxes boxes;             ///< of the targets
+    Bounds3d bounds;                ///< of every part
+    [[nodiscard]] const Scene& scene() const { return meshes->scene(); }
+    [[nodiscard]] float tolerance() const { return float(1e-6 * bounds.diagonal()); }
+};
+
+/// @param keep      parts that stay whole.
+/// @param cut_only  if not empty, only these may be cut. Precedence: target, keep, cut_only.
+[[nodiscard]] Subject make_subject(const MeshBvhs& meshes, std::span<const PartId> targets,
+                                   std::span<const PartId> keep = {}, std::span<const PartId> cut_only = {},
+                                   const Control& control = {});
+
+/// Where one target alone would be seen.
+struct TargetView {
+    PartId part = kNoPart;
+    Mask alone;                     ///< 1 at pixel centres (or, if thin, pixels with a sub-pixel sample) it covers
+    std::int64_t pixels_alone = 0;  ///< of those, inside the picture
+    std::int64_t pixels_outside = 0; ///< of those, in the margin around the picture
+    std::int64_t fine_samples = 0;  ///< thin targets: sub-pixel samples that hit, inside the picture
+    bool thin = false;              ///< under 16 pixels: seen through sub-pixel samples
+    bool absent = false;            ///< no sample hits it
+    bool refused = false;           ///< no room for a hole
+    PartId hidden_by = kNoPart;     ///< another target that covers over half of its pixels
+};
+
+struct ViewPlan {
+    View view;
+    int depth_px = 0;   ///< width of the band asked for
+    Rect window;        ///< the part of picture and margin that the hole can touch; all images below
+    std::vector<TargetView> targets; ///< in the order of Subject::targets
+    std::vector<PartId> opened;      ///< targets neither absent nor refused
+    IdBuffer target_ids;             ///< opened targets only
+    Spans spans;                     ///< what lies in front of them
+    std::vector<PartId> cut_set;     ///< parts that are cut, increasing
+    Mask enclosing;                  ///< E
+    std::vector<Contour> contours;
+    Hole hole;                       ///< empty if nothing hides the targets
+    std::vector<int> paper_depth_px; ///< style paper: k per opened target
+    Cut cut;                         ///< empty if nothing is to be cut
+
+    struct Rays {
+        std::int64_t targets = 0, alone = 0, spans = 0, enclosing = 0, loose = 0;
+        std::int64_t paper_step1 = 0, paper_step2 = 0;
+    } rays;
+
+    [[nodiscard]] bool nothing_revealed() const { return opened.empty(); }
+    [[nodiscard]] bool nothing_to_cut() const { return cut.empty(); }
+};
+
+/// Plans the hole of one view. The same bits for any number of threads.
+/// @throws Error usage E0120 (depth out of range); Cancelled.
+/// Cost: rays at the targets' pixels and around them, not a full frame; see ViewPlan::rays.
+/// Safe to call concurrently on one subject.
+[[nodiscard]] ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params = {},
+                                 const Control& control = {});
+
+/// Width of the band in pixels that `params` ask for in `view`.
+[[nodiscard]] int band_depth_px(const Subject& subject, const View& view, const PlanParams& params);
+
+} // namespace porthole

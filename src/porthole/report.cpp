@@ -1,0 +1,257 @@
+#include "porthole/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "porthole/hole/metrics.h"
+
+namespace porthole {
+
+namespace {
+
+std::optional<double> ratio(std::int64_t part, std::int64_t whole) {
+    if (whole == 0) return std::nullopt;
+    return double(part) / double(whole);
+}
+
+struct Summary {
+    std::optional<double> min, p5, mean, max;
+};
+
+Summary summarise(std::vector<float> values) {
+    if (values.empty()) return {};
+    std::sort(values.begin(), values.end());
+    double sum = 0;
+    for (const float v : values) sum += v;
+    return {values.front(), values[(values.size() - 1) / 20], sum / double(values.size()), values.back()};
+}
+
+/// Of the sub-pixel samples of a thin target those where it is what one sees.
+std::int64_t fine_samples_seen(const Bvh& bvh, const ViewPlan& plan, const TargetView& target, bool opened) {
+    std::int64_t seen = 0;
+    const Rect box = target.alone.window().intersected(plan.view.window());
+    const FlushDenormals flush;
+    for (int y = box.y0; y < box.y1; ++y)
+        for (int x = box.x0; x < box.x1; ++x) {
+            if (!target.alone(x, y)) continue;
+            RayHit16 rays;
+            for (int i = 0; i < kLanes; ++i) {
+                const Vec2f p = fine_position(x, y, i);
+                const Ray ray = plan.view.ray(p.x, p.y);
+                // Opened: in front of a target sample everything that may be cut is gone, so
+                // only fixed parts can hide it.
+                rays.set(i, ray.origin, ray.direction, 0.0f, kInfinity, opened ? kMaskFixed : kMaskAll);
+            }
+            intersect(bvh, rays, Coherence::coherent);
+            for (int i = 0; i < kLanes; ++i) seen += rays.hit(i) && rays.part(i) == target.part;
+        }
+    return seen;
+}
+
+TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, const TargetView& target,
+                            std::span<const float> rings, const Frame& before, const Frame& after) {
+    TargetReport r;
+    r.part = target.part;
+    r.path = subject.scene().parts[index(target.part)].path;
+    r.pixels_alone = target.pixels_alone;
+    r.thin = target.thin;
+    r.depth_asked_px = plan.depth_px;
+    if (target.pixels_alone + target.pixels_outside > 0)
+        r.off_image_share = double(target.pixels_outside) / double(target.pixels_alone + target.pixels_outside);
+    if (target.absent) r.refused = "absent";
+    else if (target.refused) r.refused = "no room";
+
+    const Rect box = target.alone.window().intersected(before.ids.window());
+    std::int64_t seen_before = 0, seen_after = 0, among = 0, among_seen = 0;
+    for (int y = box.y0; y < box.y1; ++y)
+        for (int x = box.x0; x < box.x1; ++x) {
+            const bool alone = target.alone(x, y) != 0;
+            seen_before += alone && before.ids.id(x, y) == target.part;
+            seen_after += alone && after.ids.id(x, y) == target.part;
+            const bool nearest = plan.target_ids.id.at_or(x, y, kNoPart) == target.part;
+            among += nearest;
+            among_seen += nearest && after.ids.id(x, y) == target.part;
+        }
+    if (target.thin) {
+        r.visible_before = ratio(fine_samples_seen(bvh, plan, target, false), target.fine_samples);
+        r.visible_after = r.refused.empty() ? ratio(fine_samples_seen(bvh, plan, target, true), target.fine_samples)
+                                            : r.visible_before;
+        r.visible_among_targets = r.visible_after;
+    } else {
+        r.visible_before = ratio(seen_before, target.pixels_alone);
+        r.visible_after = ratio(seen_after, target.pixels_alone);
+        r.visible_among_targets = ratio(among_seen, among);
+    }
+
+    for (const Contour& contour : plan.contours) {
+        const bool own = !contour.pixels.empty() && plan.target_ids.id(contour.pixels[0].x, contour.pixels[0].y) == target.part;
+        if (!own) continue;
+        r.components += contour.outer;
+        r.closed = r.closed && contour.closed;
+    }
+    std::vector<float> clearance, width, ring;
+    std::int64_t covered = 0;
+    for (std::size_t i = 0; i < plan.hole.band.size(); ++i) {
+        const BandPixel& c = plan.hole.band[i];
+        if (c.target != target.part) continue;
+        ++r.contour_pixels;
+        if (!c.covered) continue;
+        ++covered;
+        if (std::isfinite(c.clearance_px)) clearance.push_back(c.clearance_px);
+        width.push_back(c.width_px);
+        if (rings[i] >= 0) ring.push_back(rings[i]);
+    }
+    r.covered = ratio(covered, r.contour_pixels);
+    if (clearance.size() == width.size()) {
+        const Summary s = summarise(clearance);
+        r.clearance_min_px = s.min, r.clearance_p5_px = s.p5, r.clearance_mean_px = s.mean;
+    } else if (!clearance.empty()) {
+        // Some pixels have no border in reach: the mean is infinite.
+        const Summary s = summarise(clearance);
+        r.clearance_min_px = s.min;
+        if (clearance.size() * 20 >= width.size()) r.clearance_p5_px = s.p5;
+    }
+    const Summary w = summarise(width);
+    r.depth_used_min_px = w.min, r.depth_used_mean_px = w.mean, r.depth_used_max_px = w.max;
+    const Summary s = summarise(ring);
+    r.ring_mean = s.mean, r.ring_p5 = s.p5, r.ring_min = s.min;
+    return r;
+}
+
+PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, const Frame& before, const Frame& after) {
+    PictureReport r;
+    const Image<PartId>&w = before.ids.id, &o = after.ids.id;
+    r.outline_iou = outline_iou(w, o);
+    std::vector<std::uint8_t> is_target(subject.scene().parts.size(), 0);
+    for (const PartId id : subject.targets) is_target[index(id)] = 1;
+    if (const double removed = context_removed(w, o, is_target); removed >= 0) r.context_removed = removed;
+
+    std::vector<std::uint8_t> seen_before(is_target.size(), 0), seen_after(is_target.size(), 0);
+    for (std::size_t i = 0; i < w.pixels().size(); ++i) {
+        if (w.pixels()[i] != kNoPart) seen_before[index(w.pixels()[i])] = 1;
+        if (o.pixels()[i] != kNoPart) seen_after[index(o.pixels()[i])] = 1;
+        r.see_through_px += w.pixels()[i] != kNoPart && o.pixels()[i] == kNoPart;
+    }
+    for (std::size_t i = 0; i < seen_before.size(); ++i)
+        if (seen_before[i] && !seen_after[i]) r.parts_lost.push_back(subject.scene().parts[i].path);
+
+    if (!plan.cut.empty()) {
+        const Rect box = plan.hole.window.intersected(w.window());
+        for (int y = box.y0; y < box.y1; ++y)
+            for (int x = box.x0; x < box.x1; ++x) r.hole_pixels += plan.hole.mask(x, y);
+    }
+    return r;
+}
+
+nlohmann::ordered_json json_of(const std::optional<double>& v) {
+    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json(nullptr);
+}
+
+nlohmann::ordered_json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
+
+} // namespace
+
+Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, const Frame& before, const Frame& after,
+               const Control& control) {
+    (void)control;
+    const Scene& scene = subject.scene();
+    Report report;
+    report.parts = std::int64_t(scene.parts.size());
+    report.triangles = std::int64_t(triangle_count(scene));
+    report.view = plan.view;
+    report.nothing_to_cut = plan.nothing_to_cut();
+
+    std::vector<float> rings;
+    if (!plan.hole.empty())
+        rings = ring_shares(plan.hole, plan.target_ids, after.ids, subject.roles, plan.depth_px);
+    for (const TargetView& target : plan.targets) {
+        report.targets.push_back(measure_target(subject, plan, bvh, target, rings, before, after));
+        if (target.hidden_by != kNoPart)
+            report.warnings.push_back({"W0103", "--target",
+                                       "target '" + scene.parts[index(target.hidden_by)].path + "' hides target '" +
+                                           scene.parts[index(target.part)].path +
+                                           "'; targets never cut each other: ask for one of them"});
+    }
+    for (const PartId id : plan.cut_set) report.cut_parts.push_back(scene.parts[index(id)].path);
+    report.picture = measure_picture(subject, plan, before, after);
+    report.plan_rays = plan.rays;
+    report.frame_rays = before.rays;
+    report.frame_rays.primary += plan.cut.empty() ? 0 : after.rays.primary;
+    report.frame_rays.shadow += plan.cut.empty() ? 0 : after.rays.shadow;
+    report.frame_rays.ambient += plan.cut.empty() ? 0 : after.rays.ambient;
+    report.frame_rays.reflection += plan.cut.empty() ? 0 : after.rays.reflection;
+    report.frame_rays.refraction += plan.cut.empty() ? 0 : after.rays.refraction;
+    return report;
+}
+
+std::string to_json(const Report& report) {
+    using Json = nlohmann::ordered_json;
+    Json j;
+    j["version"] = report.version;
+    j["command"] = report.command;
+    j["model"] = {{"path", report.model_path}, {"parts", report.parts}, {"triangles", report.triangles}};
+    const Affine3d c(report.view.world_from_camera);
+    j["camera"] = {{"name", report.camera},
+                   {"orthographic", report.view.orthographic},
+                   {"position", json_of(c.p)},
+                   {"right", json_of(c.x)},
+                   {"up", json_of(c.y)},
+                   {"forward", json_of(-c.z)},
+                   {report.view.orthographic ? "half_height" : "tan_half_fov_y", report.view.half_height}};
+    j["size"] = {report.view.width, report.view.height};
+    j["nothing_to_cut"] = report.nothing_to_cut;
+
+    Json targets = Json::array();
+    for (const TargetReport& t : report.targets)
+        targets.push_back(
+            {{"id", index(t.part)},
+             {"path", t.path},
+             {"pixels_alone", t.pixels_alone},
+             {"visible_before", json_of(t.visible_before)},
+             {"visible_after", json_of(t.visible_after)},
+             {"visible_among_targets", json_of(t.visible_among_targets)},
+             {"contour_pixels", t.contour_pixels},
+             {"components", t.components},
+             {"closed", t.closed},
+             {"covered", json_of(t.covered)},
+             {"clearance_px",
+              {{"min", json_of(t.clearance_min_px)}, {"p5", json_of(t.clearance_p5_px)}, {"mean", json_of(t.clearance_mean_px)}}},
+             {"depth_asked_px", t.depth_asked_px},
+             {"depth_used_px",
+              {{"min", json_of(t.depth_used_min_px)}, {"mean", json_of(t.depth_used_mean_px)}, {"max", json_of(t.depth_used_max_px)}}},
+             {"ring", {{"mean", json_of(t.ring_mean)}, {"p5", json_of(t.ring_p5)}, {"min", json_of(t.ring_min)}}},
+             {"off_image_share", t.off_image_share},
+             {"thin", t.thin},
+             {"refused", t.refused.empty() ? Json(nullptr) : Json(t.refused)}});
+    j["targets"] = targets;
+    j["cut_parts"] = report.cut_parts;
+    const PictureReport& p = report.picture;
+    j["picture"] = {{"outline_iou", json_of(p.outline_iou)},   {"see_through_px", p.see_through_px},
+                    {"context_removed", json_of(p.context_removed)}, {"parts_lost", p.parts_lost},
+                    {"wall_visible", json_of(p.wall_visible)}, {"hole_pixels", p.hole_pixels}};
+
+    const ViewPlan::Rays& r = report.plan_rays;
+    const RayCounts& f = report.frame_rays;
+    const std::int64_t primary = f.primary + r.targets + r.alone + r.enclosing + r.spans + r.loose + r.paper_step1 + r.paper_step2;
+    const std::int64_t all = primary + f.shadow + f.ambient + f.reflection + f.refraction;
+    j["rays"] = {{"targets", r.targets},         {"targets_alone", r.alone},   {"spans", r.spans},
+                 {"enclosing", r.enclosing},     {"loose", r.loose},           {"paper_step1", r.paper_step1},
+                 {"paper_step2", r.paper_step2}, {"primary", f.primary},       {"shadow", f.shadow},
+                 {"ambient", f.ambient},         {"reflection", f.reflection}, {"refraction", f.refraction},
+                 {"primary_share", all ? Json(double(primary) / double(all)) : Json(nullptr)}};
+
+    Json warnings = Json::array();
+    for (const Warning& w : report.warnings) warnings.push_back({{"code", w.code}, {"where", w.where}, {"reason", w.reason}});
+    j["warnings"] = warnings;
+    const RunReport& run = report.run;
+    j["run"] = {{"seconds",
+                 {{"load", run.load}, {"build", run.build}, {"plan", run.plan}, {"render", run.render},
+                  {"write", run.write}, {"total", run.total}}},
+                {"threads", run.threads},
+                {"isa", run.isa},
+                {"peak_bytes", run.peak_bytes}};
+    return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+} // namespace porthole

@@ -1,0 +1,45 @@
+// The whole flow: model in, picture with a hole and its report out.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "porthole/plan.h"
+#include "porthole/render/render.h"
+#include "porthole/report.h"
+#include "porthole/scene/camera.h"
+
+namespace porthole {
+
+struct RevealParams {
+    std::vector<PartId> targets;  ///< parts that must be seen
+    std::vector<PartId> keep;     ///< parts that stay whole
+    std::vector<PartId> cut_only; ///< if not empty, only these may be cut
+    bool keep_see_through = false; ///< blended and transmissive parts stay whole too
+    CameraParams camera;          ///< name "auto": chosen by the plan
+    int width = 1920, height = 1080;
+    PlanParams plan;
+    RenderParams render;
+};
+
+struct Revealed {
+    ViewPlan plan;
+    Frame frame;   ///< empty if nothing was revealed
+    Report report; ///< without version, command, model_path, load, write and total seconds
+};
+
+/// Opens a hole around the targets in whatever hides them and draws the picture.
+///
+/// @param meshes  from build_mesh_bvhs; the scene behind it must hold at least one part.
+/// @return frame and report. `plan.nothing_revealed()`: all targets are absent or refused, and
+///         there is no frame. `plan.nothing_to_cut()`: a plain picture.
+/// @throws Error usage (camera, depth), limit; Cancelled.
+/// The same bits for any number of threads. Safe to call concurrently on one scene.
+///
+///   const Scene scene = load_scene("engine.glb");
+///   const MeshBvhs meshes = build_mesh_bvhs(scene);
+///   const Revealed revealed = reveal(meshes, {.targets = select_parts(scene, {"rod*"})});
+[[nodiscard]] Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Control& control = {});
+
+} // namespace porthole
