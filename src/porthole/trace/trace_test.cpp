@@ -1,0 +1,245 @@
+// Ray queries against constructed scenes and against single rays.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <random>
+
+#include "porthole/trace/bvh.h"
+#include "porthole/trace/visibility.h"
+
+namespace porthole {
+namespace {
+
+/// A sphere of radius `r` around `c` by subdivided longitude and latitude; closed, outward.
+Mesh sphere(float r, Vec3f c, int rings = 24) {
+    Mesh mesh;
+    for (int i = 0; i <= rings; ++i)
+        for (int j = 0; j < 2 * rings; ++j) {
+            const float a = kPi * float(i) / float(rings), b = kPi * float(j) / float(rings);
+            mesh.positions.push_back(c + Vec3f{std::sin(a) * std::sin(b), std::cos(a), std::sin(a) * std::cos(b)} * r);
+        }
+    const auto at = [&](int i, int j) { return std::uint32_t(i * 2 * rings + j % (2 * rings)); };
+    for (int i = 0; i < rings; ++i)
+        for (int j = 0; j < 2 * rings; ++j) {
+            mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+            mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+        }
+    mesh.submeshes = {{0, std::uint32_t(mesh.triangles.size()), 0}};
+    finish_mesh(mesh);
+    return mesh;
+}
+
+/// Random small spheres inside a large one; part 0 is the large one.
+Scene nested_scene(int count, std::uint32_t seed, int rings = 24) {
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes.push_back(sphere(2.0f, {}, rings));
+    scene.meshes.push_back(sphere(0.12f, {}, rings));
+    scene.parts.push_back({"shell", "shell", 0, {}});
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> u(-1, 1);
+    for (int i = 0; i < count; ++i) {
+        Affine3d a;
+        a.p = {u(random), u(random), u(random)};
+        const std::string name = "ball" + std::to_string(i);
+        scene.parts.push_back({name, name, 1, a});
+    }
+    return scene;
+}
+
+View view_from(Vec3f eye, int width, int height) {
+    View view;
+    const Vec3f z = normalize(eye);
+    const Vec3f x = normalize(cross(Vec3f{0, 1, 0}, z));
+    view.world_from_camera = {x, cross(z, x), z, eye};
+    view.half_height = 0.4f;
+    view.width = width, view.height = height;
+    return view;
+}
+
+Control with_threads(int n) { return {{}, {}, n}; }
+
+TEST(Trace, DepthsOfASphereAreThoseOfTheSphere) {
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes.push_back(sphere(1.0f, {}, 200));
+    scene.parts.push_back({"s", "s", 0, {}});
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const Bvh bvh = build_bvh(meshes, all_parts(scene));
+    const View view = view_from({0, 0, 5}, 64, 64);
+    const IdBuffer ids = trace_ids(bvh, view, view.window());
+    EXPECT_EQ(ids.id(32, 32), PartId{0});
+    EXPECT_NEAR(ids.depth(32, 32), 4.0f, 1e-3);
+    EXPECT_EQ(ids.id(0, 0), kNoPart);
+    EXPECT_EQ(ids.depth(0, 0), kInfinity);
+}
+
+TEST(Trace, BlocksEqualTheFullBufferFromManyDirections) {
+    const Scene scene = nested_scene(60, 7);
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    std::vector<PartId> targets;
+    for (std::uint32_t i = 1; i < scene.parts.size(); i += 3) targets.push_back(PartId{i});
+    const Bvh bvh = build_bvh(meshes, targets);
+    const ClusterBoxes boxes = cluster_boxes(scene, targets);
+    std::mt19937 random(3);
+    std::normal_distribution<float> normal;
+    for (int k = 0; k < 32; ++k) {
+        // Some eyes are among the targets, so that boxes reach behind the camera.
+        const float distance = k % 4 == 0 ? 0.5f : 6.0f;
+        const View view = view_from(
+            normalize(Vec3f{normal(random), normal(random), normal(random)}) * distance, 101, 67);
+        const Rect window = view.window().grown(13);
+        const BlockMask blocks = mark_blocks(scene, targets, boxes, view, window);
+        EXPECT_EQ(trace_ids(bvh, view, window), trace_ids_in_blocks(bvh, view, window, blocks)) << "direction " << k;
+        if (distance > 1) {
+            EXPECT_LT(blocks.count(), std::int64_t(blocks.marked.pixels().size()));
+        }
+    }
+}
+
+TEST(Trace, CropEqualsTheFullPicture) {
+    const Scene scene = nested_scene(20, 1);
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const Bvh bvh = build_bvh(meshes, all_parts(scene));
+    const View view = view_from({3, 1, 4}, 90, 70);
+    const IdBuffer full = trace_ids(bvh, view, view.window());
+    const Rect crop{13, 9, 58, 41};
+    const IdBuffer part = trace_ids(bvh, view, crop);
+    for (int y = crop.y0; y < crop.y1; ++y)
+        for (int x = crop.x0; x < crop.x1; ++x) {
+            ASSERT_EQ(part.id(x, y), full.id(x, y));
+            ASSERT_EQ(part.depth(x, y), full.depth(x, y));
+        }
+}
+
+TEST(Trace, ThreadsAndOrderOfPartsDoNotMatter) {
+    // Meshes above the size from which Embree builds with several threads.
+    const Scene scene = nested_scene(30, 5, 180);
+    const View view = view_from({3, 1, 4}, 320, 200);
+    std::vector<PartId> parts = all_parts(scene);
+    std::vector<PartId> backwards(parts.rbegin(), parts.rend());
+    std::optional<IdBuffer> first;
+    for (const int threads : {1, 2, 7, 1, 7}) {
+        const MeshBvhs meshes = build_mesh_bvhs(scene, {}, with_threads(threads));
+        for (const auto& order : {parts, backwards}) {
+            const IdBuffer ids = trace_ids(build_bvh(meshes, order), view, view.window(), with_threads(threads));
+            if (!first) first = ids;
+            EXPECT_EQ(*first, ids) << threads << " threads";
+        }
+    }
+}
+
+TEST(Trace, PartDuplicatedInPlaceChangesNothing) {
+    Scene scene = nested_scene(10, 2);
+    const View view = view_from({3, 1, 4}, 160, 100);
+    const std::vector<CutRole> roles(scene.parts.size() + 1, CutRole::cut_set);
+    const auto traced = [&] {
+        const MeshBvhs meshes = build_mesh_bvhs(scene);
+        return trace_ids(build_bvh(meshes, all_parts(scene), std::span(roles).first(scene.parts.size())), view,
+                         view.window());
+    };
+    const IdBuffer before = traced();
+    // The copy has its own mesh: only its content tells that it coincides.
+    scene.meshes.push_back(scene.meshes[0]);
+    finish_mesh(scene.meshes.back());
+    scene.parts.push_back({"shell", "shell[1]", 2, {}});
+    EXPECT_EQ(before, traced());
+}
+
+TEST(Trace, OcclusionOnInstancesReturns) {
+    // Embree 3.13.5 did not return from coherent occlusion packets on instances; ours are
+    // incoherent. A frame of them must end, and agree with nearest hits.
+    const Scene scene = nested_scene(200, 11);
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const std::vector<PartId> parts = all_parts(scene);
+    const Bvh bvh = build_bvh(meshes, std::span(parts).subspan(1));
+    const View view = view_from({3, 1, 4}, 400, 300);
+    auto coverage = std::async(std::launch::async, [&] { return trace_coverage(bvh, view, view.window()); });
+    ASSERT_EQ(coverage.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+    const Mask hit = coverage.get();
+    const IdBuffer ids = trace_ids(bvh, view, view.window());
+    for (std::size_t i = 0; i < hit.pixels().size(); ++i)
+        ASSERT_EQ(hit.pixels()[i] != 0, ids.id.pixels()[i] != kNoPart);
+}
+
+TEST(Trace, SpansAreWhatLiesInFront) {
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes.push_back(sphere(1.0f, {}, 60));
+    const auto place = [&](const char* name, double scale, double z) {
+        Affine3d a;
+        a.x.x = a.y.y = a.z.z = scale;
+        a.p.z = z;
+        scene.parts.push_back({name, name, 0, a});
+    };
+    place("target", 0.3, 0);
+    place("shell", 1.0, 0);
+    place("behind", 0.4, -3);
+    place("before", 0.1, 2);
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const std::vector<CutRole> roles{CutRole::fixed, CutRole::cut_set, CutRole::cut_set, CutRole::cut_set};
+    const Bvh whole = build_bvh(meshes, all_parts(scene), roles);
+    const std::vector<PartId> targets{PartId{0}};
+    const View view = view_from({0, 0, 6}, 200, 200);
+    const IdBuffer ids = trace_ids(build_bvh(meshes, targets), view, view.window());
+    const Spans spans = trace_spans(whole, kMaskCutSet, view, ids, 1e-5f);
+    ASSERT_EQ(spans.parts.size(), 2u);
+    EXPECT_EQ(spans.parts[0].part, PartId{1});
+    EXPECT_EQ(spans.parts[1].part, PartId{3});
+    std::int64_t target_pixels = 0;
+    for (const PartId id : ids.id.pixels()) target_pixels += id != kNoPart;
+    EXPECT_EQ(spans.parts[0].pixels, target_pixels);
+    EXPECT_LT(spans.parts[1].pixels, target_pixels);
+    EXPECT_NEAR(spans.parts[1].greatest_gap, 2.1f - 0.3f, 0.02f);
+    EXPECT_NEAR(spans.nearest(100, 100), 6 - 2.1f, 1e-3f);
+    EXPECT_EQ(spans.nearest(0, 0), kInfinity);
+}
+
+TEST(Trace, FarthestIsTheLastSurfaceBeforeTheLimit) {
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes.push_back(sphere(1.0f, {}, 60));
+    scene.parts.push_back({"s", "s", 0, {}});
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const Bvh bvh = build_bvh(meshes, all_parts(scene));
+    const View view = view_from({0, 0, 6}, 64, 64);
+    const Mask mask(view.window(), 1);
+    const Image<float> middle(view.window(), 6.0f), all(view.window(), kInfinity), none(view.window(), 1.0f);
+    EXPECT_NEAR(trace_farthest(bvh, view, mask, middle)(32, 32), 5.0f, 1e-2f);
+    EXPECT_NEAR(trace_farthest(bvh, view, mask, all)(32, 32), 7.0f, 1e-2f);
+    EXPECT_EQ(trace_farthest(bvh, view, mask, none)(32, 32), -kInfinity);
+    EXPECT_EQ(trace_farthest(bvh, view, mask, all)(0, 0), -kInfinity);
+}
+
+TEST(Trace, CutRemovesForShadowRays) {
+    Scene scene;
+    scene.materials.emplace_back();
+    scene.meshes.push_back(sphere(1.0f, {}, 60));
+    scene.parts.push_back({"s", "s", 0, {}});
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const Bvh bvh = build_bvh(meshes, all_parts(scene));
+    Cut cut;
+    cut.view = view_from({0, 0, 6}, 64, 64);
+    cut.distance = Image<float>(Rect{16, 16, 48, 48}, 1.0f);
+    for (int y = 24; y < 40; ++y)
+        for (int x = 24; x < 40; ++x) cut.distance(x, y) = -1.0f;
+    cut.cut_depth = Image<float>(cut.distance.window(), 6.0f);
+    cut.loose_depth = Image<float>(cut.distance.window(), -kInfinity);
+    cut.role = {CutRole::cut_set};
+    const auto is_occluded = [&](Vec3f origin, Vec3f direction, const Cut* c) {
+        RayHit16 rays;
+        for (int i = 0; i < kLanes; ++i) rays.clear(i);
+        rays.set(3, origin, direction, 0, 100);
+        occluded(bvh, rays, c, nullptr);
+        return rays.tfar[3] == -kInfinity;
+    };
+    // From the middle of the sphere towards the eye: through the hole. Away from it: the back stays.
+    EXPECT_TRUE(is_occluded({0, 0, 0}, {0, 0, 1}, nullptr));
+    EXPECT_FALSE(is_occluded({0, 0, 0}, {0, 0, 1}, &cut));
+    EXPECT_TRUE(is_occluded({0, 0, 0}, {0, 0, -1}, &cut));
+    EXPECT_TRUE(is_occluded({0, 0, 0}, {1, 0, 0}, &cut));
+}
+
+} // namespace
+} // namespace porthole
