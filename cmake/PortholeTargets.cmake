@@ -21,7 +21,7 @@ endmacro()
 
 # Flags that every file of this project is compiled with; not exported.
 add_library(porthole_flags INTERFACE)
-target_compile_options(porthole_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+target_compile_options(porthole_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wno-missing-field-initializers
                        $<$<BOOL:${PORTHOLE_WERROR}>:-Werror> -ffp-contract=off -mavx2 -mno-fma
                        -fno-semantic-interposition)
 if(PORTHOLE_SANITIZE)

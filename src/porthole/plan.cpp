@@ -290,7 +290,7 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     // what it covered may have become visible, what only it needed stays whole.
     for (;;) {
         plan_opened_group(subject, params, whole, blocks, plan, control);
-        if (params.tight == Tight::open || plan.hole.empty()) return plan;
+        if (params.tight == Tight::open || plan.cut_set.empty()) return plan;
         std::vector<PartId> refused = no_room(plan, params);
         if (refused.empty()) return plan;
         for (TargetView& target : plan.targets)

@@ -3,68 +3,35 @@
 
 #include <chrono>
 #include <future>
+#include <optional>
 #include <random>
 
 #include "porthole/trace/bvh.h"
 #include "porthole/trace/visibility.h"
+#include "support/shapes.h"
 
 namespace porthole {
 namespace {
 
-/// A sphere of radius `r` around `c` by subdivided longitude and latitude; closed, outward.
-Mesh sphere(float r, Vec3f c, int rings = 24) {
-    Mesh mesh;
-    for (int i = 0; i <= rings; ++i)
-        for (int j = 0; j < 2 * rings; ++j) {
-            const float a = kPi * float(i) / float(rings), b = kPi * float(j) / float(rings);
-            mesh.positions.push_back(c + Vec3f{std::sin(a) * std::sin(b), std::cos(a), std::sin(a) * std::cos(b)} * r);
-        }
-    const auto at = [&](int i, int j) { return std::uint32_t(i * 2 * rings + j % (2 * rings)); };
-    for (int i = 0; i < rings; ++i)
-        for (int j = 0; j < 2 * rings; ++j) {
-            mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-            mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-        }
-    mesh.submeshes = {{0, std::uint32_t(mesh.triangles.size()), 0}};
-    finish_mesh(mesh);
-    return mesh;
-}
+using test::Builder;
+using test::with_threads;
 
 /// Random small spheres inside a large one; part 0 is the large one.
 Scene nested_scene(int count, std::uint32_t seed, int rings = 24) {
-    Scene scene;
-    scene.materials.emplace_back();
-    scene.meshes.push_back(sphere(2.0f, {}, rings));
-    scene.meshes.push_back(sphere(0.12f, {}, rings));
-    scene.parts.push_back({"shell", "shell", 0, {}});
+    Builder b(rings);
+    b.add_sphere("shell", {}, 2);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> u(-1, 1);
-    for (int i = 0; i < count; ++i) {
-        Affine3d a;
-        a.p = {u(random), u(random), u(random)};
-        const std::string name = "ball" + std::to_string(i);
-        scene.parts.push_back({name, name, 1, a});
-    }
-    return scene;
+    for (int i = 0; i < count; ++i) b.add_sphere("ball" + std::to_string(i), {u(random), u(random), u(random)}, 0.12);
+    return std::move(b.scene);
 }
 
-View view_from(Vec3f eye, int width, int height) {
-    View view;
-    const Vec3f z = normalize(eye);
-    const Vec3f x = normalize(cross(Vec3f{0, 1, 0}, z));
-    view.world_from_camera = {x, cross(z, x), z, eye};
-    view.half_height = 0.4f;
-    view.width = width, view.height = height;
-    return view;
-}
-
-Control with_threads(int n) { return {{}, {}, n}; }
+View view_from(Vec3f eye, int width, int height) { return test::look(eye, {}, width, height, 0.4f); }
 
 TEST(Trace, DepthsOfASphereAreThoseOfTheSphere) {
-    Scene scene;
-    scene.materials.emplace_back();
-    scene.meshes.push_back(sphere(1.0f, {}, 200));
-    scene.parts.push_back({"s", "s", 0, {}});
+    Builder b(200);
+    b.add_sphere("s", {}, 1);
+    const Scene& scene = b.scene;
     const MeshBvhs meshes = build_mesh_bvhs(scene);
     const Bvh bvh = build_bvh(meshes, all_parts(scene));
     const View view = view_from({0, 0, 5}, 64, 64);
@@ -164,19 +131,12 @@ TEST(Trace, OcclusionOnInstancesReturns) {
 }
 
 TEST(Trace, SpansAreWhatLiesInFront) {
-    Scene scene;
-    scene.materials.emplace_back();
-    scene.meshes.push_back(sphere(1.0f, {}, 60));
-    const auto place = [&](const char* name, double scale, double z) {
-        Affine3d a;
-        a.x.x = a.y.y = a.z.z = scale;
-        a.p.z = z;
-        scene.parts.push_back({name, name, 0, a});
-    };
-    place("target", 0.3, 0);
-    place("shell", 1.0, 0);
-    place("behind", 0.4, -3);
-    place("before", 0.1, 2);
+    Builder b(60);
+    b.add_sphere("target", {}, 0.3);
+    b.add_sphere("shell", {}, 1.0);
+    b.add_sphere("behind", {0, 0, -3}, 0.4);
+    b.add_sphere("before", {0, 0, 2}, 0.1);
+    const Scene& scene = b.scene;
     const MeshBvhs meshes = build_mesh_bvhs(scene);
     const std::vector<CutRole> roles{CutRole::fixed, CutRole::cut_set, CutRole::cut_set, CutRole::cut_set};
     const Bvh whole = build_bvh(meshes, all_parts(scene), roles);
@@ -197,10 +157,9 @@ TEST(Trace, SpansAreWhatLiesInFront) {
 }
 
 TEST(Trace, FarthestIsTheLastSurfaceBeforeTheLimit) {
-    Scene scene;
-    scene.materials.emplace_back();
-    scene.meshes.push_back(sphere(1.0f, {}, 60));
-    scene.parts.push_back({"s", "s", 0, {}});
+    Builder b(60);
+    b.add_sphere("s", {}, 1);
+    const Scene& scene = b.scene;
     const MeshBvhs meshes = build_mesh_bvhs(scene);
     const Bvh bvh = build_bvh(meshes, all_parts(scene));
     const View view = view_from({0, 0, 6}, 64, 64);
@@ -213,10 +172,9 @@ TEST(Trace, FarthestIsTheLastSurfaceBeforeTheLimit) {
 }
 
 TEST(Trace, CutRemovesForShadowRays) {
-    Scene scene;
-    scene.materials.emplace_back();
-    scene.meshes.push_back(sphere(1.0f, {}, 60));
-    scene.parts.push_back({"s", "s", 0, {}});
+    Builder b(60);
+    b.add_sphere("s", {}, 1);
+    const Scene& scene = b.scene;
     const MeshBvhs meshes = build_mesh_bvhs(scene);
     const Bvh bvh = build_bvh(meshes, all_parts(scene));
     Cut cut;

@@ -1,0 +1,233 @@
+// Plans of constructed scenes, checked against their geometry.
+#include "porthole/plan.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <random>
+
+#include "support/shapes.h"
+
+namespace porthole {
+namespace {
+
+using test::Builder;
+using test::look;
+
+bool same(const ViewPlan& a, const ViewPlan& b) {
+    if (!(a.target_ids == b.target_ids) || !(a.hole.mask == b.hole.mask) || !(a.hole.distance == b.hole.distance)) return false;
+    if (!(a.cut.cut_depth == b.cut.cut_depth) || !(a.cut.loose_depth == b.cut.loose_depth)) return false;
+    if (a.contours.size() != b.contours.size() || a.cut.role != b.cut.role) return false;
+    for (std::size_t i = 0; i < a.contours.size(); ++i)
+        if (a.contours[i].pixels != b.contours[i].pixels) return false;
+    return true;
+}
+
+TEST(Plan, NestedSpheresOpenWithinHalfTheClearanceEverywhere) {
+    Builder b(64);
+    const PartId core = b.add_sphere("core", {0.2, 0.1, 0}, 0.4);
+    b.add_sphere("shell", {0, 0, 0}, 1);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, std::array{core});
+    const View view = look({0, 0, 10}, {}, 300, 300, 1.2f, true);
+    const ViewPlan plan = plan_view(subject, view, {.depth = Length{Length::Unit::pixel, 60}});
+    ASSERT_FALSE(plan.nothing_to_cut());
+    ASSERT_EQ(plan.opened.size(), 1u);
+
+    // The silhouettes are circles in pixels: 125 px to the metre.
+    const double scale = 125, shell = scale, x0 = 150 + 0.2 * scale, y0 = 150 - 0.1 * scale;
+    double widest = 0;
+    for (const BandPixel& c : plan.hole.band) {
+        EXPECT_TRUE(c.covered);
+        const double to_center = std::hypot(c.pixel.x + 0.5 - 150, c.pixel.y + 0.5 - 150);
+        const double clearance = shell - to_center;
+        EXPECT_NEAR(c.clearance_px, clearance, 1.5);
+        EXPECT_NEAR(c.width_px, std::min(60.0, clearance / 3), 0.6);
+        widest = std::max(widest, double(c.width_px));
+    }
+    EXPECT_GT(widest, 20);
+    // k <= d / 2: a band pixel k away from the target is at least 2 k away from the outside.
+    for (int y = plan.window.y0; y < plan.window.y1; ++y)
+        for (int x = plan.window.x0; x < plan.window.x1; ++x) {
+            if (!plan.hole.mask(x, y) || plan.target_ids.id(x, y) != kNoPart) continue;
+            const double k = std::hypot(x + 0.5 - x0, y + 0.5 - y0) - 0.4 * scale;
+            const double d = shell - std::hypot(x + 0.5 - 150, y + 0.5 - 150);
+            EXPECT_LE(k, d / 2 + 1.5) << x << ',' << y;
+        }
+}
+
+TEST(Plan, TangentSpheresAreRefusedByThePaperAndOpenedAsACrescentByDefault) {
+    Builder b(96);
+    const PartId inner = b.add_sphere("inner", {0.6, 0, 0}, 0.4);
+    b.add_sphere("outer", {0, 0, 0}, 1);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, std::array{inner});
+    const View view = look({0, 0, 10}, {}, 300, 300, 1.2f, true);
+
+    const ViewPlan paper = plan_view(subject, view, {.style = HoleStyle::paper});
+    EXPECT_TRUE(paper.nothing_revealed());
+    ASSERT_EQ(paper.targets.size(), 1u);
+    EXPECT_TRUE(paper.targets[0].refused);
+
+    const ViewPlan plan = plan_view(subject, view, {.depth = Length{Length::Unit::pixel, 20}});
+    ASSERT_FALSE(plan.nothing_revealed());
+    // From the geometry: a contour point at angle a from the point of contact lies
+    // 1 - |(0.6, 0) + 0.4 (cos a, sin a)| inside the outer circle.
+    for (const BandPixel& c : plan.hole.band) {
+        const double a = std::atan2(150 - (c.pixel.y + 0.5), c.pixel.x + 0.5 - 225);
+        const double clearance = 125 * (1 - std::hypot(0.6 + 0.4 * std::cos(a), 0.4 * std::sin(a)));
+        EXPECT_NEAR(c.width_px, std::min(20.0, clearance / 3), 0.8) << "angle " << a;
+    }
+    // Nothing of the band lies outside the outer circle.
+    for (int y = plan.window.y0; y < plan.window.y1; ++y)
+        for (int x = plan.window.x0; x < plan.window.x1; ++x) {
+            if (plan.hole.mask(x, y) && plan.target_ids.id(x, y) == kNoPart) {
+                EXPECT_LT(std::hypot(x + 0.5 - 150, y + 0.5 - 150), 125.7);
+            }
+        }
+}
+
+TEST(Plan, TargetThatFillsItsShellIsRefused) {
+    Builder b(96);
+    const PartId inner = b.add_sphere("inner", {0, 0, 0}, 0.99);
+    b.add_sphere("outer", {0, 0, 0}, 1);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, std::array{inner});
+    const View view = look({0, 0, 10}, {}, 300, 300, 1.2f, true);
+    const ViewPlan plan = plan_view(subject, view);
+    EXPECT_TRUE(plan.nothing_revealed());
+    EXPECT_TRUE(plan.targets[0].refused);
+    const ViewPlan forced = plan_view(subject, view, {.tight = Tight::open});
+    EXPECT_FALSE(forced.nothing_revealed());
+    EXPECT_FALSE(forced.nothing_to_cut());
+}
+
+TEST(Plan, FloorUnderABoxStaysAndABoltOnTheLidGoes) {
+    Builder b;
+    const PartId target = b.add_sphere("target", {0, 0.5, 0}, 0.35);
+    const PartId floor = b.add_box("floor", {0, -0.1, 0}, {6, 0.1, 6});
+    b.add_box("wall_left", {-1, 0.5, 0}, {0.05, 0.5, 1});
+    b.add_box("wall_right", {1, 0.5, 0}, {0.05, 0.5, 1});
+    b.add_box("wall_front", {0, 0.5, 1}, {1, 0.5, 0.05});
+    b.add_box("wall_back", {0, 0.5, -1}, {1, 0.5, 0.05});
+    const PartId lid = b.add_box("lid", {0, 1.05, 0}, {1.1, 0.05, 1.1});
+    // On the lid, beside the target's silhouette but within the band.
+    const PartId bolt = b.add_sphere("bolt", {0.47, 1.1, 0.1}, 0.05);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, std::array{target});
+    const View view = look({0, 8, 1.5f}, {0, 0.5f, 0}, 400, 400, 0.25f);
+    const ViewPlan plan = plan_view(subject, view, {.depth = Length{Length::Unit::pixel, 40}});
+    ASSERT_FALSE(plan.nothing_to_cut());
+
+    EXPECT_EQ(plan.cut.role[index(lid)], CutRole::cut_set);
+    EXPECT_EQ(plan.cut.role[index(bolt)], CutRole::loose);
+    EXPECT_EQ(plan.cut.role[index(floor)], CutRole::loose);
+
+    // Every point of the bolt inside the hole is gone, no point of the floor is.
+    const IdBuffer before = trace_ids(subject.whole, view, view.window());
+    int bolt_pixels = 0, floor_pixels = 0;
+    const std::array only_floor{floor};
+    const IdBuffer floor_ids = trace_ids(build_bvh(meshes, only_floor), view, view.window());
+    const Rect box = plan.window.intersected(view.window());
+    for (int y = box.y0; y < box.y1; ++y)
+        for (int x = box.x0; x < box.x1; ++x) {
+            if (!plan.hole.mask(x, y)) continue;
+            const Ray ray = view.ray(float(x) + 0.5f, float(y) + 0.5f);
+            const auto point = [&](float depth) { return ray.origin + ray.direction * (depth / ray.depth_per_t); };
+            if (before.id(x, y) == bolt) {
+                ++bolt_pixels;
+                EXPECT_TRUE(plan.cut.removes(point(before.depth(x, y)), bolt));
+            }
+            ++floor_pixels;
+            EXPECT_FALSE(plan.cut.removes(point(floor_ids.depth(x, y)), floor));
+        }
+    EXPECT_GT(bolt_pixels, 20);
+    EXPECT_GT(floor_pixels, 1000);
+}
+
+TEST(Plan, KeptPartsAreFixedAndCutOnlyLimits) {
+    Builder b;
+    const PartId target = b.add_sphere("target", {0, 0, 0}, 0.3);
+    const PartId inner = b.add_sphere("inner", {0, 0, 0}, 0.6);
+    const PartId outer = b.add_sphere("outer", {0, 0, 0}, 1.0);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const View view = look({0, 0, 10}, {}, 200, 200, 1.2f, true);
+    const auto cut_set = [&](std::vector<PartId> keep, std::vector<PartId> only) {
+        return plan_view(make_subject(meshes, std::array{target}, keep, only), view).cut_set;
+    };
+    EXPECT_EQ(cut_set({}, {}), (std::vector{inner, outer}));
+    EXPECT_EQ(cut_set({outer}, {}), (std::vector{inner}));
+    EXPECT_EQ(cut_set({}, {outer}), (std::vector{outer}));
+    EXPECT_EQ(cut_set({outer}, {outer}), (std::vector<PartId>{}));
+    EXPECT_EQ(cut_set({target}, {target, inner}), (std::vector{inner}));
+}
+
+TEST(Plan, SurfaceOnTheTargetCountsAsBehindIt) {
+    Builder b;
+    const PartId target = b.add_box("target", {0, 0, 0}, {0.5, 0.5, 0.5});
+    b.add_box("twin", {0, 0, 0}, {0.5, 0.5, 0.5});
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const ViewPlan plan = plan_view(make_subject(meshes, std::array{target}), look({2, 3, 4}, {}, 120, 120, 0.3f));
+    EXPECT_TRUE(plan.nothing_to_cut());
+    EXPECT_TRUE(plan.cut_set.empty());
+}
+
+TEST(Plan, AbsentAndVisibleTargets) {
+    Builder b;
+    const PartId visible = b.add_sphere("visible", {0, 0, 0}, 0.5);
+    const PartId beside = b.add_sphere("beside", {50, 0, 0}, 0.5);
+    const PartId behind = b.add_sphere("behind the eye", {0, 0, 20}, 0.5);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const View view = look({0, 0, 10}, {}, 100, 100, 0.2f);
+    const ViewPlan plan = plan_view(make_subject(meshes, std::array{visible, beside, behind}), view);
+    ASSERT_EQ(plan.targets.size(), 3u);
+    EXPECT_FALSE(plan.targets[0].absent);
+    EXPECT_TRUE(plan.targets[1].absent);
+    EXPECT_TRUE(plan.targets[2].absent);
+    EXPECT_TRUE(plan.nothing_to_cut());
+    EXPECT_FALSE(plan.nothing_revealed());
+    EXPECT_TRUE(plan_view(make_subject(meshes, std::array{beside}), view).nothing_revealed());
+}
+
+TEST(Plan, ThinTargetsAreFoundBetweenPixelCentres) {
+    Builder b;
+    const PartId dot = b.add_sphere("dot", {0.012, 0.012, 0}, 0.004); // 0.4 px wide, off the centres
+    b.add_sphere("shell", {0, 0, 0}, 1);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const View view = look({0, 0, 10}, {}, 120, 120, 1.2f, true);
+    const ViewPlan plan = plan_view(make_subject(meshes, std::array{dot}), view);
+    ASSERT_EQ(plan.targets.size(), 1u);
+    EXPECT_TRUE(plan.targets[0].thin);
+    EXPECT_FALSE(plan.targets[0].absent);
+    EXPECT_GE(plan.targets[0].fine_samples, 1);
+    EXPECT_FALSE(plan.nothing_to_cut());
+}
+
+TEST(Plan, ExactEqualsFullAndThreadsDoNotMatter) {
+    Builder b(16);
+    std::mt19937 random(9);
+    std::uniform_real_distribution<double> u(-0.6, 0.6);
+    std::vector<PartId> targets;
+    for (int i = 0; i < 24; ++i) {
+        const Vec3d c{u(random), u(random), u(random)};
+        // Balls, wires about a pixel wide, and specks below the pixel.
+        if (i % 3 == 0) targets.push_back(b.add_sphere("ball" + std::to_string(i), c, 0.08));
+        if (i % 3 == 1) targets.push_back(b.add_box("wire" + std::to_string(i), c, {0.4, 0.004, 0.004}));
+        if (i % 3 == 2) targets.push_back(b.add_sphere("speck" + std::to_string(i), c, 0.003));
+    }
+    b.add_sphere("shell", {0, 0, 0}, 1.5);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, targets);
+    std::normal_distribution<float> normal;
+    for (int k = 0; k < 32; ++k) {
+        const Vec3f direction = normalize(Vec3f{normal(random), normal(random), normal(random)});
+        const View view = look(direction * 5.0f, {}, 161, 120, 0.4f);
+        const ViewPlan exact = plan_view(subject, view, {}, test::with_threads(1 + k % 7));
+        const ViewPlan full = plan_view(subject, view, {.contours = ContourMethod::full}, test::with_threads(2));
+        EXPECT_TRUE(same(exact, full)) << "direction " << k;
+        EXPECT_LT(exact.rays.targets, full.rays.targets);
+    }
+}
+
+} // namespace
+} // namespace porthole
