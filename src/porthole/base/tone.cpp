@@ -36,20 +36,20 @@ public:
 
     /// Any float: NaN and negative values give 0, values above 1 give Max.
     [[nodiscard]] std::uint16_t operator()(float linear) const {
-        if (!(linear > 0.0f)) return 0;
-        if (linear >= 1.0f) return std::uint16_t(Max);
-        std::size_t code = first_code_[bucket_of(linear)];
-        while (thresholds_[code] <= linear) ++code;
+        const float v = linear > kLow ? (linear < 1.0f ? linear : 1.0f) : kLow; // NaN is not above kLow
+        std::size_t code = first_code_[bucket_of(v)];
+        if constexpr (kOneStep) return std::uint16_t(code + (thresholds_[code] <= v));
+        while (thresholds_[code] <= v) ++code;
         return std::uint16_t(code);
     }
 
 private:
     static constexpr unsigned kShift = 23 - MantissaBits;
-    static constexpr float kLow = Max > 255 ? 0x1p-18f : 0x1p-13f; ///< below the first threshold
+    static constexpr bool kOneStep = Max <= 255; ///< buckets so fine that none holds two thresholds
+    static constexpr float kLow = Max > 255 ? 0x1p-21f : 0x1p-13f; ///< below the first threshold
 
     [[nodiscard]] static std::size_t bucket_of(float v) {
-        const std::uint32_t bits = std::bit_cast<std::uint32_t>(v), low = std::bit_cast<std::uint32_t>(kLow);
-        return bits <= low ? 0 : (bits - low) >> kShift;
+        return (std::bit_cast<std::uint32_t>(v) - std::bit_cast<std::uint32_t>(kLow)) >> kShift;
     }
 
     std::vector<float> thresholds_; ///< [c]: least linear value whose code is above c; 2 after the last
