@@ -1,0 +1,190 @@
+// Promises that must hold on real models, from seeded random directions.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "porthole/base/tone.h"
+#include "porthole/hole/distance.h"
+#include "porthole/io/image_file.h"
+#include "porthole/io/load.h"
+#include "porthole/plan.h"
+#include "porthole/reveal.h"
+#include "porthole/scene/camera.h"
+#include "porthole/scene/select.h"
+#include "support/shapes.h"
+#include "support/shared.h"
+
+namespace porthole {
+namespace {
+
+struct Model {
+    const char* file;
+    std::vector<std::string> targets; ///< many at once, thin ones among them
+};
+
+std::ostream& operator<<(std::ostream& out, const Model& model) { return out << model.file; }
+
+const Model kModels[] = {
+    {"assembly/2CylinderEngine.glb", {"rod_123-699*", "Spring_Link*", "body_11", "Piston*"}},
+    {"assembly/ReciprocatingSaw.glb", {"body_6*", "body_7*", "body_21"}},
+    {"assembly/MosquitoInAmber.glb", {"2_mosquito*", "6_eclats*"}},
+    {"medical/head_brain_mri.glb", {"Hippocampus_*", "Amygdala_*", "Thalamus_*"}},
+    {"assembly/vh_male_body.glb", {"VH_M_heart_left_ventricle", "VH_M_mitral_valve", "VH_M_renal_pyramid_L_*"}},
+    {"assembly/FZK_Haus.glb", {"IfcMappedItem_node_7", "IfcMappedItem_node_8", "*Wand-Int-ERDG-1_*"}},
+    {"assembly/virtual_worm.glb", {"avar", "aval", "hsnl", "int5l", "pm5d", "oocyte_ant_1"}},
+};
+
+std::vector<Vec3f> random_directions(int count, std::uint32_t seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<float> normal;
+    std::vector<Vec3f> directions;
+    for (int i = 0; i < count; ++i)
+        directions.push_back(normalize(Vec3f{normal(random), normal(random), normal(random)}));
+    return directions;
+}
+
+std::vector<std::byte> png_of(const Frame& frame) { return encode_png(to_srgb8(frame.color, {1, 1, 1}, false), 3); }
+
+/// The opened picture as a plan's cut makes it.
+Frame drawn(const Subject& subject, const ViewPlan& plan, const RenderParams& look, const Control& control = {}) {
+    Frame plain = render(subject.whole, nullptr, plan.view, look, nullptr, nullptr, control);
+    if (plan.cut.empty()) return plain;
+    const Bvh opened = build_bvh(*subject.meshes, all_parts(subject.scene()), plan.cut.role);
+    const Bvh targets = build_bvh(*subject.meshes, plan.opened);
+    return render(opened, &targets, plan.view, look, &plan.cut, &plain, control);
+}
+
+/// Contour pixels that OpenCV's border following finds, on a mask padded so that the window's
+/// edge makes no border.
+Mask opencv_contour(const Image<PartId>& ids) {
+    const Rect w = ids.window();
+    cv::Mat mask(w.height() + 2, w.width() + 2, CV_8U, cv::Scalar(0));
+    for (int y = -1; y <= w.height(); ++y)
+        for (int x = -1; x <= w.width(); ++x) {
+            const int cx = std::clamp(x, 0, w.width() - 1), cy = std::clamp(y, 0, w.height() - 1);
+            mask.at<std::uint8_t>(y + 1, x + 1) = ids(w.x0 + cx, w.y0 + cy) != kNoPart ? 255 : 0;
+        }
+    std::vector<std::vector<cv::Point>> chains;
+    cv::findContours(mask, chains, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+    Mask contour(w, 0);
+    for (const auto& chain : chains)
+        for (const cv::Point p : chain)
+            if (contour.contains(w.x0 + p.x - 1, w.y0 + p.y - 1)) contour(w.x0 + p.x - 1, w.y0 + p.y - 1) = 1;
+    return contour;
+}
+
+class Models : public testing::TestWithParam<Model> {};
+
+TEST_P(Models, ExactEqualsFullFromRandomDirections) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    const Scene scene = load_scene((shared / "models" / GetParam().file).string());
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const std::vector<PartId> targets = select_parts(scene, GetParam().targets);
+    const Subject subject = make_subject(meshes, targets);
+    const FrameSubject framing = frame_subject(scene, targets);
+    const RenderParams look{.samples = 2, .ao_samples = 1};
+
+    int opened = 0, thin = 0;
+    for (const Vec3f direction : random_directions(32, 20261122)) {
+        const View view = view_from_direction(framing, direction, {}, 240, 135);
+        const ViewPlan exact = plan_view(subject, view);
+        const ViewPlan full = plan_view(subject, view, {.contours = ContourMethod::full});
+        ASSERT_EQ(exact.target_ids, full.target_ids);
+        ASSERT_EQ(exact.contours.size(), full.contours.size());
+        for (std::size_t i = 0; i < exact.contours.size(); ++i)
+            ASSERT_EQ(exact.contours[i].pixels, full.contours[i].pixels);
+        ASSERT_EQ(exact.hole.mask, full.hole.mask);
+        ASSERT_EQ(exact.hole.distance, full.hole.distance);
+        ASSERT_EQ(exact.cut.cut_depth, full.cut.cut_depth);
+        ASSERT_EQ(exact.cut.loose_depth, full.cut.loose_depth);
+        ASSERT_EQ(drawn(subject, exact, look).color, drawn(subject, full, look).color);
+        opened += !exact.cut.empty();
+        for (const TargetView& t : exact.targets) thin += t.thin && !t.absent;
+
+        if (exact.opened.empty()) continue;
+        Mask ours(exact.window, 0);
+        for (const Vec2i p : contour_pixels(exact.contours)) ours(p.x, p.y) = 1;
+        // On the window's own edge the padding decides; inside it both must agree.
+        const Mask theirs = opencv_contour(exact.target_ids.id);
+        const Rect inner = exact.window.grown(-1);
+        for (int y = inner.y0; y < inner.y1; ++y)
+            for (int x = inner.x0; x < inner.x1; ++x) ASSERT_EQ(ours(x, y), theirs(x, y)) << x << ',' << y;
+    }
+    RecordProperty("opened", opened);
+    RecordProperty("thin", thin);
+    EXPECT_GT(opened, 0);
+}
+
+TEST_P(Models, ClearanceAgreesWithOpenCv) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    const Scene scene = load_scene((shared / "models" / GetParam().file).string());
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const std::vector<PartId> targets = select_parts(scene, GetParam().targets);
+    const Subject subject = make_subject(meshes, targets);
+    const View view = view_from_direction(frame_subject(scene, targets), {1.0f, 0.8f, 1.0f}, {}, 480, 270);
+    const ViewPlan plan = plan_view(subject, view, {.tight = Tight::open});
+    ASSERT_FALSE(plan.hole.empty());
+
+    const Rect w = plan.window;
+    cv::Mat inside(w.height(), w.width(), CV_8U), distance;
+    bool any_outside = false;
+    for (int y = 0; y < w.height(); ++y)
+        for (int x = 0; x < w.width(); ++x) {
+            const bool e = plan.enclosing(w.x0 + x, w.y0 + y) != 0;
+            inside.at<std::uint8_t>(y, x) = e ? 255 : 0;
+            any_outside |= !e;
+        }
+    cv::distanceTransform(inside, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+    for (const BandPixel& c : plan.hole.band) {
+        if (!any_outside) {
+            ASSERT_EQ(c.clearance_px, kInfinity);
+            continue;
+        }
+        const float theirs = distance.at<float>(c.pixel.y - w.y0, c.pixel.x - w.x0);
+        ASSERT_NEAR(c.clearance_px, theirs, 1e-3f * std::max(1.0f, theirs));
+    }
+}
+
+TEST_P(Models, SamePictureForAnyThreadsOrderOfPartsAndDuplicates) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    const std::string file = (shared / "models" / GetParam().file).string();
+    Scene scene = load_scene(file);
+    const auto picture = [&](const Scene& s, int threads) {
+        const Control control = test::with_threads(threads);
+        const MeshBvhs meshes = build_mesh_bvhs(s, {}, control);
+        RevealParams params;
+        params.targets = select_parts(s, GetParam().targets);
+        params.camera.name = "iso";
+        params.width = 320, params.height = 180;
+        params.plan.tight = Tight::open;
+        const Revealed revealed = reveal(meshes, params, control);
+        return png_of(revealed.frame);
+    };
+    const std::vector<std::byte> first = picture(scene, 2);
+    for (const int threads : {1, 2, 7}) EXPECT_EQ(first, picture(scene, threads)) << threads << " threads";
+
+    // The part that hides most, once more in the same place.
+    Scene twice = load_scene(file);
+    twice.parts.push_back(twice.parts[0]);
+    twice.parts.back().path += "[copy]";
+    twice.parts.back().name += "[copy]";
+    EXPECT_EQ(first, picture(twice, 2)) << "a part duplicated in place";
+
+    Scene shuffled = load_scene(file);
+    std::mt19937 random(5);
+    std::shuffle(shuffled.parts.begin(), shuffled.parts.end(), random);
+    EXPECT_EQ(first, picture(shuffled, 2)) << "parts in another order";
+}
+
+INSTANTIATE_TEST_SUITE_P(Real, Models, testing::ValuesIn(kModels), [](const auto& param) {
+    std::string name = std::filesystem::path(param.param.file).stem().string();
+    for (char& c : name)
+        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+    return name;
+});
+
+} // namespace
+} // namespace porthole
