@@ -18,14 +18,14 @@ enum class Emphasis : std::uint8_t { accent, saturate, none };
 enum class Shading : std::uint8_t { raytraced, flat };
 
 struct RenderParams {
-    int samples = 8;       ///< most samples per pixel, spent where neighbours differ; 1: one at each centre
-    int ao_samples = 4;    ///< ambient occlusion rays per pixel; 0: none
+    int samples = 8;       ///< most samples per pixel, [1, 4096], spent where neighbours differ; 1: one at each centre
+    int ao_samples = 4;    ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
     bool shadows = true;
-    int max_bounces = 6;   ///< reflections and refractions along one path
+    int max_bounces = 6;   ///< reflections, refractions and blended surfaces along one path, [0, 64]
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
-    Vec3f background{1, 1, 1}; ///< linear
-    std::uint64_t seed = 0;
+    Vec3f background{1, 1, 1}; ///< linear; seen, tinted, through coloured glass
+    float target_radius = 0;   ///< of the targets' bounding sphere, metres: scales ambient occlusion inside the hole; 0: unknown
 };
 
 struct RayCounts {
@@ -34,14 +34,14 @@ struct RayCounts {
 
 /// A rendered picture with its ids.
 struct Frame {
-    Image<Vec4f> color; ///< linear Rec.709, premultiplied alpha; alpha 0 where nothing is hit (background not in it)
+    /// Display-linear Rec.709 in [0, 1], premultiplied alpha: after the shoulder that keeps
+    /// highlights from clipping, so that the samples of a pixel are averaged as the screen
+    /// adds light. Alpha 0 where nothing is hit: the background is not in it, except for the
+    /// tint that coloured glass gives it.
+    Image<Vec4f> color;
     IdBuffer ids;       ///< at pixel centres: nearest part that is not cut away, and its depth
     RayCounts rays;
 };
-
-/// What does not depend on the view: lights (the file's, or the default rig), ambient radius,
-/// per-part flags. Cheap to make; plain value.
-struct Lighting;
 
 /// Draws `view` of everything in `bvh`.
 ///
@@ -56,8 +56,10 @@ struct Lighting;
 /// @param cut      may be null.
 /// @param under    plain frame of the same view and params; null exactly when `cut` is.
 /// @return colour, ids at pixel centres, rays spent (of this call).
-/// @throws Cancelled; Error limit E0902.
-/// The same bits for any number of threads.
+/// @throws Error usage E0130 when a parameter is out of range; Cancelled.
+/// The same bits for any number of threads. Reports progress as stage "render".
+/// Cost: 1920x1080 of an assembly of 500 thousand triangles takes about 1.5 CPU-seconds; 24
+/// bytes a pixel on top of the frame while it runs.
 [[nodiscard]] Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params,
                            const Cut* cut, const Frame* under, const Control& control = {});
 

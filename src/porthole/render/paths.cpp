@@ -1,0 +1,205 @@
+#include "porthole/render/paths.h"
+
+#include "porthole/render/bxdf.h"
+
+namespace porthole {
+
+namespace {
+
+/// Rays that can change no pixel by more than about a step of 8 bits are dropped.
+constexpr float kLeastWeight = 0.02f;
+
+float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+
+Vec3f root(Vec3f v) { return {std::sqrt(v.x), std::sqrt(v.y), std::sqrt(v.z)}; }
+
+/// Beer's law over `distance` metres inside a material.
+Vec3f absorption(const Material& m, float distance) {
+    if (!(m.attenuation_distance < kInfinity) || !(m.attenuation_distance > 0)) return {1, 1, 1};
+    const float k = std::min(distance, 1e30f) / m.attenuation_distance;
+    const auto keep = [&](float c) { return std::pow(std::clamp(c, 1e-6f, 1.0f), k); };
+    return {keep(m.attenuation_color.x), keep(m.attenuation_color.y), keep(m.attenuation_color.z)};
+}
+
+/// Whether light bends in the surface: a body with thickness, or a closed shell.
+bool bends(const Material& m, const Placement& placement) {
+    return m.transmission > 0 && (m.thickness > 0 || placement.closed);
+}
+
+/// The colour that light takes on where it passes the surface. Of a blended body alpha says
+/// how strong it is.
+Vec3f surface_tint(const Substance& s, bool body) {
+    const Vec3f color{clamp01(s.color.x), clamp01(s.color.y), clamp01(s.color.z)};
+    if (!body) return color;
+    return root(lerp(Vec3f{1, 1, 1}, color, s.coverage)); // once on the way in, once out
+}
+
+} // namespace
+
+void Media::leave(std::int32_t m) {
+    for (int i = count; i-- > 0;) {
+        if (material[std::size_t(i)] != m) continue;
+        for (int k = i + 1; k < count; ++k) material[std::size_t(k - 1)] = material[std::size_t(k)];
+        --count;
+        return;
+    }
+}
+
+Vec4f display_color(const Radiance& r, Vec3f background) {
+    const Vec3f shown = shoulder(r.light) + r.shown;
+    const float open = clamp01(std::min({r.background.x, r.background.y, r.background.z}));
+    const Vec3f extra = (r.background - Vec3f{open, open, open}) * background;
+    return {shown.x + extra.x, shown.y + extra.y, shown.z + extra.z, 1.0f - open};
+}
+
+void Shader::push(const PathRay& ray) {
+    if (largest(ray.weight) < kLeastWeight) return;
+    if (ray.bounce <= stage_->params.max_bounces) queue_.push_back(ray);
+    else end_in_surroundings(ray); // where it would have gone on: bright rather than black
+}
+
+void Shader::end_in_surroundings(const PathRay& ray) {
+    Radiance& sum = radiance_[ray.slot];
+    const float strength = stage_->lighting.ambient + stage_->lighting.fill.y;
+    if (ray.through) sum.background += ray.weight;
+    else sum.light += ray.weight * sky_radiance(ray.direction, ray.roughness) * strength;
+}
+
+void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, const Reach& reach, bool on_target) {
+    const Stage& stage = *stage_;
+    const Placement& placement = stage.placements[index(hit.part)];
+    const Tint tint = on_target && !stage.tints.empty() ? stage.tints[index(hit.part)] : Tint{};
+    Substance s = substance(stage.scene, placement, hit, tint);
+    const Vec3f to_eye = -ray.direction;
+    const Vec3f normal = s.material->normal_texture.texture >= 0
+                             ? mapped_normal(stage.scene, placement, hit, point, *s.material, ray.direction)
+                             : point.normal;
+    Radiance& sum = radiance_[ray.slot];
+    if (stage.params.shading == Shading::flat) {
+        sum.shown += ray.weight * shade_flat(s, normal, to_eye);
+        return;
+    }
+
+    const bool body = bends(*s.material, placement);
+    // A blended body is seen through by refraction alone; a straight view would be a second image.
+    const float coverage = body ? 1.0f : s.coverage;
+    const Vec3f weight = ray.weight * coverage;
+    const bool inside = body && !point.front;
+    if (inside) s.f0 = {0, 0, 0}; // what it mirrors is the path's own business
+    const Shaded shaded = shade(stage.lighting, point, normal, to_eye, s, reach, !inside);
+    sum.light += weight * shaded.light;
+    sum.shown += weight * shaded.shown;
+
+    PathRay next = ray;
+    ++next.bounce;
+    if (largest(shaded.mirror) > 0) {
+        next.origin = point.start;
+        next.direction = reflect(ray.direction, normal);
+        // A bent normal can send the ray into the surface: keep it grazing.
+        const float above = dot(next.direction, point.flat_normal);
+        if (above < 0.01f) next.direction = normalize(next.direction + point.flat_normal * (0.01f - above));
+        next.weight = weight * shaded.mirror;
+        next.roughness = s.roughness;
+        next.through = false;
+        if (largest(next.weight) < kLeastWeight) end_in_surroundings(next);
+        else push(next);
+        next = ray;
+        ++next.bounce;
+    }
+    if (coverage < 1.0f) {
+        next.origin = point.beyond;
+        next.weight = ray.weight * (1.0f - coverage);
+        push(next);
+    }
+    if (s.transmission > 0) pass_through(ray, s, point, normal, weight * s.transmission, body);
+}
+
+void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfacePoint& point, Vec3f normal, Vec3f weight,
+                          bool body) {
+    const Scene& scene = stage_->scene;
+    const float cosine = dot(normal, -ray.direction);
+    PathRay next = ray;
+    ++next.bounce;
+    next.origin = point.beyond;
+    if (!body) {
+        next.weight = weight * surface_tint(s, false) * (1.0f - fresnel_dielectric(cosine, std::max(1.0f, s.material->ior)));
+        push(next);
+        return;
+    }
+    const auto material = std::int32_t(s.material - scene.materials.data());
+    if (point.front) next.media.enter(material);
+    else next.media.leave(material);
+    const auto ior = [&](const Media& media) {
+        const std::int32_t m = media.innermost();
+        return m == kNone ? 1.0f : std::max(1.0f, scene.materials[std::size_t(m)].ior);
+    };
+    const float eta = ior(next.media) / ior(ray.media);
+    const float mirrored = fresnel_dielectric(cosine, eta);
+    const auto direction = refract(ray.direction, normal, eta);
+    if (direction) {
+        next.direction = *direction;
+        next.weight = weight * surface_tint(s, true) * (1.0f - mirrored);
+        push(next);
+    }
+    if (point.front) return; // the outside's mirror image is in shade()
+    next = ray;
+    ++next.bounce;
+    next.origin = point.start;
+    next.direction = reflect(ray.direction, normal);
+    next.weight = direction ? weight * mirrored : weight;
+    push(next);
+}
+
+void Shader::finish() {
+    // The newest first: the queue stays short, and rays that were born together stay together.
+    while (!queue_.empty()) trace_newest();
+}
+
+void Shader::trace_newest() {
+    const Stage& stage = *stage_;
+    const std::size_t n = std::min<std::size_t>(queue_.size(), kLanes);
+    std::array<PathRay, kLanes> rays;
+    std::copy(queue_.end() - std::ptrdiff_t(n), queue_.end(), rays.begin());
+    queue_.resize(queue_.size() - n);
+
+    const bool cuts = stage.cut && !stage.cut->empty();
+    RayHit16 packet, open;
+    bool any_plain = false;
+    for (int i = 0; i < kLanes; ++i) {
+        const PathRay& ray = rays[std::size_t(i)];
+        packet.clear(i);
+        if (std::size_t(i) >= n) continue;
+        ++(ray.through ? rays_->refraction : rays_->reflection);
+        if (cuts && ray.in_hole) {
+            open.set(i, ray.origin, ray.direction, 0, kInfinity);
+            intersect_cut(stage.bvh, open, i, stage.cut);
+        } else {
+            packet.set(i, ray.origin, ray.direction, 0, kInfinity);
+            any_plain = true;
+        }
+    }
+    if (any_plain) intersect(stage.bvh, packet, Coherence::incoherent);
+
+    for (int i = 0; i < int(n); ++i) {
+        PathRay& ray = rays[std::size_t(i)];
+        const RayHit16& from = cuts && ray.in_hole ? open : packet;
+        if (!from.hit(i)) {
+            end_in_surroundings(ray);
+            continue;
+        }
+        const std::int32_t medium = ray.media.innermost();
+        if (medium != kNone) ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);
+        if (largest(ray.weight) < kLeastWeight) continue;
+        const Hit hit{from.part(i), from.triangle[i], from.u[i], from.v[i]};
+        const Placement& placement = stage.placements[index(hit.part)];
+        const SurfacePoint point = surface_point(placement, hit, ray.direction);
+        const Material& m = stage.scene.materials[placement.mesh->material_of(hit.triangle)];
+        Reach reach;
+        const bool clear_inside = !point.front && m.transmission > 0.99f && bends(m, placement);
+        if (!m.unlit && !clear_inside)
+            reach = stage.occlusion.reach({point.position, point.start, point.flat_normal, point.normal, ray.in_hole, 0}, *rays_);
+        add(ray, hit, point, reach, false);
+    }
+}
+
+} // namespace porthole

@@ -1,0 +1,62 @@
+// The passes of one picture, tile by tile. Each pass reads what earlier ones wrote, and a tile
+// writes only its own pixels, so the result does not depend on the order of tiles.
+#pragma once
+
+#include <atomic>
+
+#include "porthole/render/filter.h"
+#include "porthole/render/gbuffer.h"
+#include "porthole/render/paths.h"
+
+namespace porthole {
+
+/// RayCounts that many threads add to. Integers: the sum does not depend on the order.
+class RayTotals {
+public:
+    void add(const RayCounts& rays);
+    [[nodiscard]] RayCounts get() const;
+
+private:
+    std::atomic<std::int64_t> primary_{0}, shadow_{0}, ambient_{0}, reflection_{0}, refraction_{0};
+};
+
+/// One picture on its way.
+struct Picture {
+    const View& view;
+    const RenderParams& params;
+    const Camera& camera;
+    GBuffer buffer;
+    Image<Vec4f> color;   ///< display-linear, premultiplied; the buffer's window
+    Mask edges;           ///< 1 where the first sample is not enough
+    Mask opened;          ///< with a cut: 1 where some sample is in the hole
+    RayTotals rays;
+
+    Picture(const View& seen, const RenderParams& how, const Camera& by, Rect window)
+        : view(seen), params(how), camera(by), buffer(window), color(window, Vec4f{}), edges(window), opened(window) {}
+};
+
+/// Marks what is to be traced in the plain picture: everything.
+void mark_everything(Picture& picture);
+
+/// Marks the pixels that can have samples in the hole, those that the rim may cross, and a
+/// few around, whose light the filter and the rim's samples need.
+void mark_hole(Picture& picture, const Cut& cut);
+
+/// Pixels that mark_hole() would mark, rounded out to blocks, inside the picture.
+[[nodiscard]] Rect hole_window(const Cut& cut, const View& view);
+
+/// Pass 1: camera rays through the pixel centres, their shadow and ambient rays.
+void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile);
+
+/// Pass 2: filters the light and shades the first samples.
+void shade_tile(Picture& picture, const Stage& stage, Rect tile);
+
+/// Pass 3: marks pixels that differ from a neighbour in part, side of the rim, crease,
+/// depth, brightness or colour.
+void find_edges(Picture& picture, Rect tile);
+
+/// Pass 4: traces the other samples of marked pixels and averages. Ambient light is borrowed
+/// from a neighbouring pixel that saw the same surface.
+void refine_tile(Picture& picture, const Stage& stage, Rect tile);
+
+} // namespace porthole

@@ -1,0 +1,142 @@
+#include "porthole/render/primary.h"
+
+namespace porthole {
+
+Camera::Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut)
+    : bvh_(&bvh), targets_(targets), view_(&view), cut_(cut) {
+    if (!cut) return;
+    tolerance_ = float(1e-6 * scene_bounds(bvh.scene()).diagonal());
+    for (std::size_t i = 0; i < cut->role.size(); ++i) {
+        const CutRole role = cut->role[i];
+        has_cut_set_ |= role == CutRole::cut_set;
+        has_loose_ |= role == CutRole::loose;
+        has_kept_ |= role == CutRole::fixed && !(targets && targets->holds(PartId(i)));
+    }
+}
+
+namespace {
+
+void store_hit(const RayHit16& rays, int lane, float depth, Seen16& seen) {
+    seen.hit[lane] = {rays.part(lane), rays.triangle[lane], rays.u[lane], rays.v[lane]};
+    seen.depth[lane] = depth;
+}
+
+} // namespace
+
+Seen16 Camera::trace(const Samples16& samples, RayCounts& rays) const {
+    Seen16 seen;
+    bool plain[kLanes];
+    bool any_open = false;
+    for (int i = 0; i < kLanes; ++i) {
+        seen.hit[i] = {};
+        seen.depth[i] = kInfinity;
+        seen.in_hole[i] = seen.on_target[i] = false;
+        plain[i] = samples.active[i];
+        any_open |= samples.active[i] && samples.may_open[i];
+    }
+    RayHit16 packet;
+    float depth_per_t[kLanes];
+    for (int i = 0; i < kLanes; ++i) {
+        if (!samples.active[i]) {
+            packet.clear(i);
+            continue;
+        }
+        const Ray ray = view_->ray(samples.x[i], samples.y[i]);
+        packet.set(i, ray.origin, ray.direction, 0, kInfinity);
+        depth_per_t[i] = ray.depth_per_t;
+        seen.origin[i] = ray.origin;
+        seen.direction[i] = ray.direction;
+    }
+    if (any_open && cut_ && !cut_->empty()) {
+        trace_open(samples, seen, plain, rays);
+        bool left = false;
+        for (int i = 0; i < kLanes; ++i) {
+            if (samples.active[i] && !plain[i]) packet.clear(i);
+            left |= plain[i];
+        }
+        if (!left) return seen;
+    }
+    intersect(*bvh_, packet, Coherence::coherent);
+    for (int i = 0; i < kLanes; ++i) {
+        if (!plain[i]) continue;
+        ++rays.primary;
+        if (packet.hit(i)) store_hit(packet, i, packet.tfar[i] * depth_per_t[i], seen);
+    }
+    return seen;
+}
+
+void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const {
+    float depth_per_t[kLanes] = {};
+    float target_depth[kLanes];
+    for (float& d : target_depth) d = kInfinity;
+    if (targets_ && !targets_->empty()) {
+        RayHit16 packet;
+        for (int i = 0; i < kLanes; ++i) {
+            if (samples.active[i] && samples.may_open[i]) packet.set(i, seen.origin[i], seen.direction[i], 0, kInfinity);
+            else packet.clear(i);
+        }
+        intersect(*targets_, packet, Coherence::coherent);
+        for (int i = 0; i < kLanes; ++i) {
+            if (!samples.active[i] || !samples.may_open[i]) continue;
+            ++rays.primary;
+            depth_per_t[i] = view_->ray(samples.x[i], samples.y[i]).depth_per_t;
+            if (!packet.hit(i)) continue;
+            target_depth[i] = packet.tfar[i] * depth_per_t[i];
+            store_hit(packet, i, target_depth[i], seen);
+            seen.on_target[i] = true;
+        }
+    }
+
+    float kept[kLanes], cut_set[kLanes], loose[kLanes]; // where rays start; +infinity: not at all
+    for (int i = 0; i < kLanes; ++i) {
+        kept[i] = cut_set[i] = loose[i] = kInfinity;
+        if (!samples.active[i] || !samples.may_open[i]) continue;
+        const float x = samples.x[i], y = samples.y[i];
+        seen.in_hole[i] = seen.on_target[i] || cut_->distance_at(x, y) <= 0;
+        if (!seen.in_hole[i]) continue;
+        plain[i] = false;
+        depth_per_t[i] = view_->ray(x, y).depth_per_t;
+        const auto start = [&](CutRole role) { return std::max(0.0f, cut_->depth_at(x, y, role)) / depth_per_t[i]; };
+        kept[i] = 0;
+        loose[i] = start(CutRole::loose);
+        // Behind a target the cut set cannot be seen, in front of it nothing is left of it.
+        if (!seen.on_target[i]) cut_set[i] = start(CutRole::cut_set);
+        // What lies on the target counts as behind it.
+        if (seen.on_target[i])
+            seen.depth[i] = target_depth[i] -
+                            std::max(tolerance_, 8 * std::numeric_limits<float>::epsilon() * target_depth[i]);
+    }
+    if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, seen, rays);
+    if (has_cut_set_) trace_role(kMaskCutSet, cut_set, depth_per_t, seen, rays);
+    if (has_loose_) trace_role(kMaskLoose, loose, depth_per_t, seen, rays);
+    for (int i = 0; i < kLanes; ++i)
+        if (seen.on_target[i]) seen.depth[i] = target_depth[i];
+}
+
+void Camera::trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],
+                        Seen16& seen, RayCounts& rays) const {
+    RayHit16 packet;
+    bool any = false;
+    for (int i = 0; i < kLanes; ++i) {
+        if (tnear[i] < kInfinity) {
+            packet.set(i, seen.origin[i], seen.direction[i], tnear[i], kInfinity, mask);
+            any = true;
+        } else {
+            packet.clear(i);
+        }
+    }
+    if (!any) return;
+    intersect(*bvh_, packet, Coherence::coherent);
+    for (int i = 0; i < kLanes; ++i) {
+        if (!(tnear[i] < kInfinity)) continue;
+        ++rays.primary;
+        if (!packet.hit(i)) continue;
+        const float depth = packet.tfar[i] * depth_per_t[i];
+        // Strictly nearer: on a tie the role that was asked earlier stays.
+        if (!(depth < seen.depth[i])) continue;
+        store_hit(packet, i, depth, seen);
+        seen.on_target[i] = false;
+    }
+}
+
+} // namespace porthole

@@ -1,0 +1,50 @@
+// Camera rays: what each sample sees, with and without a hole.
+#pragma once
+
+#include "porthole/render/render.h"
+#include "porthole/render/surface.h"
+
+namespace porthole {
+
+/// Sixteen camera samples at continuous pixel positions.
+struct Samples16 {
+    float x[kLanes] = {}, y[kLanes] = {};
+    bool active[kLanes] = {};
+    bool may_open[kLanes] = {}; ///< the sample's pixel can have samples in the hole
+};
+
+struct Seen16 {
+    Hit hit[kLanes];
+    Vec3f origin[kLanes];
+    Vec3f direction[kLanes];
+    float depth[kLanes];    ///< metres along camera -z; +infinity if nothing is hit
+    bool in_hole[kLanes];   ///< the sample lies in the hole: its rays obey the cut
+    bool on_target[kLanes]; ///< in the hole, and an opened target is what it sees
+};
+
+/// Traces camera rays of one view. Holds references; const use is thread-safe.
+class Camera {
+public:
+    /// @param targets, cut  both null for a plain picture.
+    Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut);
+
+    /// Nearest hits. A sample that may open asks the targets first: one that hits sees the
+    /// target, or what is kept in front of it; else it is in the hole where the rim's signed
+    /// distance is not positive, and sees the nearest of what the cut leaves. Other samples
+    /// see the plain scene.
+    [[nodiscard]] Seen16 trace(const Samples16& samples, RayCounts& rays) const;
+
+private:
+    void trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const;
+    void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes], Seen16& seen,
+                    RayCounts& rays) const;
+
+    const Bvh* bvh_;
+    const Bvh* targets_;
+    const View* view_;
+    const Cut* cut_;
+    float tolerance_ = 0;      ///< metres in front of a target that count as behind it
+    bool has_kept_ = false, has_cut_set_ = false, has_loose_ = false;
+};
+
+} // namespace porthole

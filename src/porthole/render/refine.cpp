@@ -1,0 +1,214 @@
+#include "porthole/render/picture.h"
+
+namespace porthole {
+
+namespace {
+
+constexpr float kCrease = 0.96f;        ///< cosine: normals that differ more are a crease
+constexpr float kContrast = 0.05f;      ///< of encoded brightness, on one smooth surface
+constexpr float kSmallContrast = 0.015f; ///< across a crease or step
+constexpr float kBorrowNormal = 0.9f;
+
+/// Roughly as the eye (and the file) sees it.
+Vec4f encoded(Vec4f c) {
+    const auto root = [](float v) { return std::sqrt(std::max(v, 0.0f)); };
+    return {root(c.x), root(c.y), root(c.z), c.w};
+}
+
+float contrast(Vec4f a, Vec4f b) {
+    return std::max({std::abs(a.x - b.x), std::abs(a.y - b.y), std::abs(a.z - b.z), std::abs(a.w - b.w)});
+}
+
+/// Whether two pixels see the same smooth piece of surface.
+bool same_surface(const Picture& picture, int ax, int ay, int bx, int by) {
+    const GBuffer& g = picture.buffer;
+    if (g.ids.id(ax, ay) == kNoPart) return true;
+    const Vec3f na = unpack_normal(g.pixels(ax, ay).normal), nb = unpack_normal(g.pixels(bx, by).normal);
+    if (dot(na, nb) < kCrease) return false;
+    const auto position = [&](int x, int y) {
+        const Ray ray = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f);
+        return ray.origin + ray.direction * (g.ids.depth(x, y) / ray.depth_per_t);
+    };
+    const Vec3f step = position(bx, by) - position(ax, ay);
+    const float pixel = picture.view.pixel_size(std::min(g.ids.depth(ax, ay), g.ids.depth(bx, by)));
+    return std::min(std::abs(dot(step, na)), std::abs(dot(step, nb))) < pixel;
+}
+
+bool differs(const Picture& picture, int ax, int ay, int bx, int by) {
+    const GBuffer& g = picture.buffer;
+    if (g.key(ax, ay) != g.key(bx, by)) return true;
+    const float c = contrast(encoded(picture.color(ax, ay)), encoded(picture.color(bx, by)));
+    if (c > kContrast) return true;
+    return c > kSmallContrast && !same_surface(picture, ax, ay, bx, by);
+}
+
+/// Filtered ambient light of a neighbouring pixel on the same surface; negative if none.
+float borrow_ambient(const GBuffer& buffer, std::uint32_t key, Vec3f normal, float sx, float sy) {
+    const int x = int(std::floor(sx)), y = int(std::floor(sy));
+    // The sample's own pixel, then its neighbours, the side on which the sample lies first.
+    const int hx = sx - float(x) < 0.5f ? -1 : 1, hy = sy - float(y) < 0.5f ? -1 : 1;
+    const Vec2i order[] = {{0, 0}, {hx, 0}, {0, hy}, {hx, hy}, {-hx, 0}, {0, -hy}, {hx, -hy}, {-hx, hy}, {-hx, -hy}};
+    for (const Vec2i d : order) {
+        const int px = x + d.x, py = y + d.y;
+        if (!buffer.pixels.contains(px, py) || buffer.key(px, py) != key) continue;
+        if (dot(unpack_normal(buffer.pixels(px, py).normal), normal) < kBorrowNormal) continue;
+        return float(buffer.ambient(px, py)) * (1.0f / 65535.0f);
+    }
+    return -1.0f;
+}
+
+PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole) {
+    PathRay ray;
+    ray.direction = direction;
+    ray.slot = slot;
+    ray.in_hole = in_hole;
+    return ray;
+}
+
+/// Sample `s` of up to sixteen pixels, into slots group_index * 16 + lane of the shader.
+void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> pixels, int s, int group_index,
+                   Shader& shader,
+                   std::array<bool, kLanes>& in_hole, RayCounts& rays) {
+    const GBuffer& buffer = picture.buffer;
+    const Vec2f at = pixel_sample(s);
+    Samples16 samples;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+        samples.x[i] = float(pixels[i].x) + at.x, samples.y[i] = float(pixels[i].y) + at.y;
+        samples.active[i] = true;
+        samples.may_open[i] = buffer.pixels(pixels[i].x, pixels[i].y).has(Pixel::may_open);
+    }
+    const Seen16 seen = picture.camera.trace(samples, rays);
+
+    const bool flat = picture.params.shading == Shading::flat;
+    std::array<SurfacePoint, kLanes> surface;
+    std::array<Asker, kLanes> askers;
+    std::array<std::size_t, kLanes> lane_of;
+    std::array<float, kLanes> ambient;
+    std::size_t n = 0;
+    const std::uint32_t first = std::uint32_t(group_index) * kLanes;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+        in_hole[i] = in_hole[i] || seen.in_hole[i];
+        const Hit& hit = seen.hit[i];
+        if (!hit.any()) {
+            shader.miss(first + std::uint32_t(i));
+            continue;
+        }
+        surface[i] = surface_point(stage.placements[index(hit.part)], hit, seen.direction[i]);
+        const SurfacePoint& p = surface[i];
+        // Each sample of a pixel looks at another part of the lamps.
+        const int pattern = cell_rank(pixels[i].x, pixels[i].y) + s * 5;
+        if (flat) {
+            shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i]), hit, p, {}, seen.on_target[i]);
+            continue;
+        }
+        askers[n] = {p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern};
+        const std::uint32_t key = index(hit.part) * 2 + (seen.in_hole[i] ? 1u : 0u);
+        ambient[n] = borrow_ambient(buffer, key, p.normal, samples.x[i], samples.y[i]);
+        lane_of[n++] = i;
+    }
+    if (n == 0) return;
+    std::array<Vec3f, kLanes> lamps;
+    stage.occlusion.lamps(std::span(askers.data(), n), lamps.data(), rays);
+    for (std::size_t k = 0; k < n; ++k) {
+        const std::size_t i = lane_of[k];
+        const Reach reach = ambient[k] >= 0 ? Reach{lamps[k], ambient[k]} : stage.occlusion.reach(askers[k], rays);
+        shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i]), seen.hit[i], surface[i], reach,
+                   seen.on_target[i]);
+    }
+}
+
+} // namespace
+
+void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
+    GBuffer& buffer = picture.buffer;
+    const bool flat = picture.params.shading == Shading::flat;
+    RayCounts rays;
+    FilteredTile filtered;
+    if (!flat) filter_tile(buffer, picture.view, tile, filtered);
+    Shader shader(stage, FilteredTile::kSize * FilteredTile::kSize, rays);
+    filtered.tile = tile;
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x) {
+            const Pixel& pixel = buffer.pixels(x, y);
+            if (!pixel.has(Pixel::traced)) continue;
+            const auto slot = std::uint32_t(filtered.index(x, y));
+            const Hit hit = buffer.hit(x, y);
+            if (!hit.any()) {
+                shader.miss(slot);
+                continue;
+            }
+            const Vec3f direction = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
+            const SurfacePoint point = surface_point(stage.placements[index(hit.part)], hit, direction);
+            const Reach reach = flat ? Reach{} : filtered.reach(x, y);
+            buffer.ambient(x, y) = std::uint16_t(std::lround(clamp01(reach.ambient) * 65535.0f));
+            shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole)), hit, point, reach,
+                       pixel.has(Pixel::on_target));
+        }
+    shader.finish();
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x) {
+            const Pixel& pixel = buffer.pixels(x, y);
+            if (!pixel.has(Pixel::traced)) continue;
+            picture.color(x, y) = display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
+            picture.opened(x, y) = pixel.has(Pixel::in_hole) ? 1 : 0;
+        }
+    picture.rays.add(rays);
+}
+
+void find_edges(Picture& picture, Rect tile) {
+    const Rect w = picture.buffer.window();
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x) {
+            const Pixel& pixel = picture.buffer.pixels(x, y);
+            if (!pixel.has(Pixel::traced)) continue;
+            bool edge = pixel.has(Pixel::rim);
+            const auto look = [&](int ox, int oy) {
+                if (edge || !w.contains(ox, oy) || !picture.buffer.pixels(ox, oy).has(Pixel::traced)) return;
+                edge = differs(picture, x, y, ox, oy);
+            };
+            look(x + 1, y), look(x - 1, y), look(x, y + 1), look(x, y - 1);
+            picture.edges(x, y) = edge ? 1 : 0;
+        }
+}
+
+void refine_tile(Picture& picture, const Stage& stage, Rect tile) {
+    const int n = picture.params.samples;
+    std::vector<Vec2i> todo;
+    for (int by = tile.y0 & ~(kCell - 1); by < tile.y1; by += kCell)
+        for (int bx = tile.x0 & ~(kCell - 1); bx < tile.x1; bx += kCell)
+            for (int i = 0; i < kCellPixels; ++i) {
+                const int x = bx + i % kCell, y = by + i / kCell;
+                if (tile.contains(x, y) && picture.edges(x, y)) todo.push_back({x, y});
+            }
+    if (todo.empty()) return;
+    RayCounts rays;
+    // Samples are shaded in groups, so that mirrored and refracted rays fill their packets.
+    constexpr int kGroup = 16;
+    Shader shader(stage, std::size_t(kGroup) * kLanes, rays);
+    for (std::size_t begin = 0; begin < todo.size(); begin += kLanes) {
+        const std::span<const Vec2i> pixels(todo.data() + begin, std::min<std::size_t>(kLanes, todo.size() - begin));
+        std::array<Vec4f, kLanes> sum;
+        std::array<bool, kLanes> in_hole{};
+        for (std::size_t i = 0; i < pixels.size(); ++i) {
+            sum[i] = picture.color(pixels[i].x, pixels[i].y);
+            in_hole[i] = picture.opened(pixels[i].x, pixels[i].y) != 0;
+        }
+        for (int s0 = 1; s0 < n; s0 += kGroup) {
+            const int count = std::min(kGroup, n - s0);
+            shader.clear();
+            for (int s = 0; s < count; ++s) trace_samples(picture, stage, pixels, s0 + s, s, shader, in_hole, rays);
+            shader.finish();
+            for (int s = 0; s < count; ++s)
+                for (std::size_t i = 0; i < pixels.size(); ++i)
+                    sum[i] = sum[i] + display_color(shader.radiance(std::uint32_t(s) * kLanes + std::uint32_t(i)),
+                                                    picture.params.background);
+        }
+        for (std::size_t i = 0; i < pixels.size(); ++i) {
+            picture.color(pixels[i].x, pixels[i].y) = sum[i] * (1.0f / float(n));
+            picture.opened(pixels[i].x, pixels[i].y) = in_hole[i] ? 1 : 0;
+        }
+    }
+    picture.rays.add(rays);
+}
+
+} // namespace porthole

@@ -1,0 +1,102 @@
+#include "porthole/render/render.h"
+
+#include <string>
+
+#include "porthole/render/emphasis.h"
+#include "porthole/render/picture.h"
+
+namespace porthole {
+
+namespace {
+
+void check(const RenderParams& p) {
+    const auto in_range = [](const char* name, int value, int low, int high) {
+        if (value >= low && value <= high) return;
+        throw Error(ErrorKind::usage, "E0130", name,
+                    std::to_string(value) + " is outside " + std::to_string(low) + ".." + std::to_string(high));
+    };
+    in_range("samples", p.samples, 1, 4096);
+    in_range("ao_samples", p.ao_samples, 0, 256);
+    in_range("max_bounces", p.max_bounces, 0, 64);
+}
+
+/// Runs one pass over all tiles and reports its share of the work.
+class Passes {
+public:
+    Passes(Rect window, const Control& control) : window_(window), control_(control) {
+        constexpr std::int64_t kSize = FilteredTile::kSize;
+        tiles_ = std::max<std::int64_t>(1, (window.width() / kSize + 2) * (window.height() / kSize + 2));
+    }
+    template <typename Body> void run(double share, Body body) {
+        std::atomic<std::int64_t> done{0};
+        parallel_for_tiles(window_, FilteredTile::kSize, control_, [&](Rect tile) {
+            body(tile);
+            const std::int64_t n = ++done;
+            if (control_.progress) control_.progress("render", base_ + share * std::min(1.0, double(n) / double(tiles_)));
+        });
+        base_ += share;
+        if (control_.progress) control_.progress("render", std::min(1.0, base_));
+    }
+
+private:
+    Rect window_;
+    const Control& control_;
+    std::int64_t tiles_;
+    double base_ = 0;
+};
+
+void draw(Picture& picture, const Bvh& bvh, const Cut* cut, const Control& control) {
+    const Scene& scene = bvh.scene();
+    const RenderParams& params = picture.params;
+    const Lighting lighting = make_lighting(scene, picture.view, params.target_radius);
+    const Occlusion occlusion(bvh, cut, lighting, params);
+    const std::vector<Placement> placements = make_placements(scene);
+    Passes passes(picture.buffer.window(), control);
+    passes.run(0.5, [&](Rect tile) { gather_tile(picture, occlusion, placements, tile); });
+
+    std::vector<Tint> tints;
+    if (cut) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
+    const Stage stage{scene, bvh, cut, params, lighting, occlusion, placements, tints};
+    passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
+    if (params.samples > 1) {
+        passes.run(0.02, [&](Rect tile) { find_edges(picture, tile); });
+        passes.run(0.28, [&](Rect tile) { refine_tile(picture, stage, tile); });
+    }
+}
+
+} // namespace
+
+Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* cut,
+             const Frame* under, const Control& control) {
+    check(params);
+    if (!cut) {
+        const Camera camera(bvh, nullptr, view, nullptr);
+        Picture picture(view, params, camera, view.window());
+        mark_everything(picture);
+        draw(picture, bvh, nullptr, control);
+        return {std::move(picture.color), std::move(picture.buffer.ids), picture.rays.get()};
+    }
+
+    Frame frame = *under;
+    frame.rays = {};
+    const Rect window = cut->empty() ? Rect{} : hole_window(*cut, view);
+    if (window.empty()) return frame;
+    const Camera camera(bvh, targets, view, cut);
+    Picture picture(view, params, camera, window);
+    mark_hole(picture, *cut);
+    draw(picture, bvh, cut, control);
+    // Only pixels with a sample in the hole change; the others stay the plain picture's.
+    for (int y = window.y0; y < window.y1; ++y)
+        for (int x = window.x0; x < window.x1; ++x) {
+            const Pixel& pixel = picture.buffer.pixels(x, y);
+            if (!pixel.has(Pixel::may_open) || !picture.opened(x, y)) continue;
+            frame.color(x, y) = picture.color(x, y);
+            if (!pixel.has(Pixel::in_hole)) continue;
+            frame.ids.id(x, y) = picture.buffer.ids.id(x, y);
+            frame.ids.depth(x, y) = picture.buffer.ids.depth(x, y);
+        }
+    frame.rays = picture.rays.get();
+    return frame;
+}
+
+} // namespace porthole

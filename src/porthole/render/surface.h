@@ -1,0 +1,77 @@
+// From a hit to a point that can be shaded: where it is, which way it faces, what it is made of.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "porthole/base/ids.h"
+#include "porthole/scene/scene.h"
+
+namespace porthole {
+
+/// A hit as the ray query reports it.
+struct Hit {
+    PartId part = kNoPart;
+    std::uint32_t triangle = 0;
+    float u = 0, v = 0; ///< barycentric weights of corners 1 and 2
+    [[nodiscard]] bool any() const { return part != kNoPart; }
+};
+
+/// A part's placement in float, ready for shading.
+struct Placement {
+    Affine3f world_from_mesh;
+    Vec3f nx, ny, nz;         ///< columns that turn an outward mesh normal into an outward world normal
+    const Mesh* mesh = nullptr;
+    float offset = 0;         ///< how far secondary rays start off the surface, metres
+    bool closed = false;      ///< a transmissive part whose surface is closed: light bends in it
+};
+
+/// Placements of all parts of a scene; keeps pointers into it.
+/// Cost: linear in the parts, and in the triangles of transmissive meshes.
+[[nodiscard]] std::vector<Placement> make_placements(const Scene& scene);
+
+/// Geometry of a hit, seen along a ray.
+struct SurfacePoint {
+    Vec3f position;      ///< on the triangle
+    Vec3f start;         ///< where secondary rays start on the viewer's side: off the triangle, on the curved
+                         ///< surface that the vertex normals describe, so that facets cast no shadow on it
+    Vec3f beyond;        ///< where rays start that go through the surface
+    Vec3f flat_normal;   ///< unit, of the triangle, on the viewer's side
+    Vec3f normal;        ///< unit, smooth, on the viewer's side of surface and triangle
+    bool front = true;   ///< seen from outside, as the winding says
+};
+/// @param direction  unit, of the ray that hit.
+[[nodiscard]] SurfacePoint surface_point(const Placement& placement, const Hit& hit, Vec3f direction);
+
+/// What the surface is made of at a hit, textures and vertex colours looked up.
+struct Substance {
+    const Material* material = nullptr;
+    Vec3f color;          ///< base colour, linear, as in the file
+    Vec3f diffuse;        ///< albedo of the matte part
+    Vec3f f0;             ///< reflectance at normal incidence
+    float roughness = 1;  ///< [0.03, 1]
+    float coverage = 1;   ///< alpha of blended materials
+    float transmission = 0;
+    float occlusion = 1;  ///< from the occlusion texture
+    Vec3f emission;
+};
+
+/// How the colour of an emphasised part is changed.
+struct Tint {
+    enum class Kind : std::uint8_t { none, saturate, accent } kind = Kind::none;
+};
+
+/// Matte albedo is kept within these: what is darker reads as a hole, what is lighter clips.
+inline constexpr float kDarkest = 0.03f, kLightest = 0.85f;
+
+[[nodiscard]] Substance substance(const Scene& scene, const Placement& placement, const Hit& hit, Tint tint = {});
+
+/// The normal with the normal map applied, on the viewer's side, never turned away from the
+/// viewer.
+[[nodiscard]] Vec3f mapped_normal(const Scene& scene, const Placement& placement, const Hit& hit,
+                                  const SurfacePoint& point, const Material& material, Vec3f direction);
+
+/// `color` with its distance from grey multiplied; not below zero.
+[[nodiscard]] Vec3f saturated(Vec3f color, float factor);
+
+} // namespace porthole
