@@ -114,8 +114,16 @@ void occluded(const Bvh& bvh, RayHit16& rays, const Cut* cut, Vec3f* transmittan
 /// Coverage query: lanes that meet any surface, of whatever material, get tfar = -infinity.
 void occluded_by_any(const Bvh& bvh, RayHit16& rays);
 
-/// Calls visit(lane, part, t) for every surface that the active lanes cross between tnear and
-/// tfar, in no particular order but the same every time. Alpha-masked texels are no surface.
+/// One surface that a ray passes through.
+struct Crossing {
+    int lane = 0;
+    PartId part = kNoPart;
+    float t = 0;
+    bool entering = false; ///< through the front of a triangle, by the mesh's own winding
+};
+
+/// Calls visit(Crossing) for every surface that the active lanes cross between tnear and tfar,
+/// in no particular order but the same every time. Alpha-masked texels are no surface.
 /// `rays` keeps its tfar.
 template <typename Visit> void for_each_crossing(const Bvh& bvh, RayHit16& rays, Visit&& visit);
 
@@ -124,14 +132,14 @@ template <typename Visit> void for_each_crossing(const Bvh& bvh, RayHit16& rays,
 void intersect_cut(const Bvh& bvh, RayHit16& rays, int lane, const Cut* cut);
 
 namespace detail {
-using VisitCrossing = void (*)(void* visit, int lane, PartId part, float t);
+using VisitCrossing = void (*)(void* visit, const Crossing& crossing);
 void for_each_crossing(const Bvh& bvh, RayHit16& rays, VisitCrossing call, void* visit);
 } // namespace detail
 
 template <typename Visit> void for_each_crossing(const Bvh& bvh, RayHit16& rays, Visit&& visit) {
     using V = std::remove_reference_t<Visit>;
     detail::for_each_crossing(
-        bvh, rays, [](void* v, int lane, PartId part, float t) { (*static_cast<V*>(v))(lane, part, t); }, &visit);
+        bvh, rays, [](void* v, const Crossing& crossing) { (*static_cast<V*>(v))(crossing); }, &visit);
 }
 
 } // namespace porthole

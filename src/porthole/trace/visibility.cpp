@@ -242,15 +242,16 @@ Spans trace_spans(const Bvh& bvh, std::uint32_t mask, const View& view, const Id
             }
             if (!any) return;
             met.clear();
-            for_each_crossing(bvh, packet, [&](int lane, PartId part, float t) {
-                const float d = t * depth_per_t[lane];
+            for_each_crossing(bvh, packet, [&](const Crossing& c) {
+                const int lane = c.lane;
+                const float d = c.t * depth_per_t[lane];
                 float& nearest = spans.nearest(x0 + (lane & 3), y0 + (lane >> 2));
                 nearest = std::min(nearest, d);
                 const std::uint32_t gap = std::bit_cast<std::uint32_t>(std::max(0.0f, depth[lane] - d));
-                std::atomic<std::uint32_t>& greatest = gaps[index(part)];
+                std::atomic<std::uint32_t>& greatest = gaps[index(c.part)];
                 std::uint32_t seen = greatest.load(std::memory_order_relaxed);
                 while (seen < gap && !greatest.compare_exchange_weak(seen, gap, std::memory_order_relaxed)) {}
-                met.emplace_back(part, lane);
+                met.emplace_back(c.part, lane);
             });
             std::sort(met.begin(), met.end());
             met.erase(std::unique(met.begin(), met.end()), met.end());
@@ -308,9 +309,9 @@ Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask, 
                 ++n;
             }
             if (!any) return;
-            for_each_crossing(bvh, packet, [&](int lane, PartId, float t) {
-                float& d = farthest(x0 + (lane & 3), y0 + (lane >> 2));
-                d = std::max(d, t * depth_per_t[lane]);
+            for_each_crossing(bvh, packet, [&](const Crossing& c) {
+                float& d = farthest(x0 + (c.lane & 3), y0 + (c.lane >> 2));
+                d = std::max(d, c.t * depth_per_t[c.lane]);
             });
         });
         traced += n;
