@@ -42,11 +42,11 @@ struct Contour {
 using TraceIds = std::function<std::vector<PartId>(std::span<const Vec2i>)>;
 
 struct PaperContours {
-    std::vector<Contour> contours; ///< one per departure, in the order they were found
-    std::vector<PartId> ids;       ///< the id each contour belongs to
+    std::vector<Contour> contours;               ///< one per departure, in the order they were found
+    std::vector<PartId> ids;                     ///< the id each contour belongs to
     std::int64_t step1_rays = 0, step2_rays = 0; ///< pixels traced, each pixel once
-    Image<PartId> known; ///< every id traced so far; kNoPart also where nothing was traced
-    Mask traced;         ///< 1 where `known` was traced
+    Image<PartId> known;                         ///< every id traced so far; kNoPart also where nothing was traced
+    Mask traced;                                 ///< 1 where `known` was traced
 };
 
 /// The paper's contour detection, steps 1 and 2, by frozen readings.

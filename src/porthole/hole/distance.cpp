@@ -53,7 +53,8 @@ public:
 
     /// Calls visit(arc, begin, end) for each arc with its range of integers, left to right.
     template <typename Visit> void for_each_arc(const Visit& visit) const {
-        for (std::size_t i = 0; i < size_; ++i) visit(arcs_[i], arcs_[i].first, i + 1 < size_ ? arcs_[i + 1].first : end_);
+        for (std::size_t i = 0; i < size_; ++i)
+            visit(arcs_[i], arcs_[i].first, i + 1 < size_ ? arcs_[i + 1].first : end_);
     }
 
 private:

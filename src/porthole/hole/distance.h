@@ -35,7 +35,7 @@ struct PowerSite {
 };
 
 struct PowerDistance {
-    Image<std::int64_t> value; ///< min over sites of scale * |p - c|^2 - weight; kFar beyond the limit
+    Image<std::int64_t> value;   ///< min over sites of scale * |p - c|^2 - weight; kFar beyond the limit
     Image<std::int32_t> nearest; ///< index of the site that attains it; -1 beyond the limit
 };
 

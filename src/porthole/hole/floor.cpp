@@ -116,7 +116,8 @@ Image<float> paint_floor(Image<float> depth, const Image<PartId>& targets, std::
     for (const FloorDisc& disc : discs) {
         const std::int64_t radius2 = disc.weight / scale;
         const auto radius = std::int32_t(integer_sqrt(radius2));
-        const std::int32_t y0 = std::max(disc.center.y - radius, box.y0), y1 = std::min(disc.center.y + radius + 1, box.y1);
+        const std::int32_t y0 = std::max(disc.center.y - radius, box.y0),
+                           y1 = std::min(disc.center.y + radius + 1, box.y1);
         for (std::int32_t y = y0; y < y1; ++y) {
             const std::int64_t dy = y - disc.center.y;
             const auto half = std::int32_t(integer_sqrt(radius2 - dy * dy));
@@ -144,7 +145,8 @@ Image<float> blur_floor(Image<float> depth, const Mask& mask, const Image<PartId
     for_each_pixel(read, [&](std::int32_t x, std::int32_t y) { values(x, y) = mask(x, y) ? 1.0 : 0.0; });
     const Image<double> counts = square_sums(values, radius);
     for (; times > 0; --times) {
-        for_each_pixel(read, [&](std::int32_t x, std::int32_t y) { values(x, y) = mask(x, y) ? double(depth(x, y)) : 0.0; });
+        for_each_pixel(read,
+                       [&](std::int32_t x, std::int32_t y) { values(x, y) = mask(x, y) ? double(depth(x, y)) : 0.0; });
         const Image<double> sums = square_sums(values, radius);
         for_each_pixel(box, [&](std::int32_t x, std::int32_t y) {
             if (mask(x, y) && targets(x, y) == kNoPart) depth(x, y) = float(sums(x, y) / counts(x, y));

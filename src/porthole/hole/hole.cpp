@@ -78,8 +78,10 @@ void draw_discs(Hole& hole, const Image<PartId>& targets, std::span<const PowerS
         const bool side = outside(x - 1, y) || outside(x + 1, y) || outside(x, y - 1) || outside(x, y + 1);
         const bool corner =
             outside(x - 1, y - 1) || outside(x + 1, y - 1) || outside(x - 1, y + 1) || outside(x + 1, y + 1);
-        if (side) hole.distance(x, y) = -0.5f;
-        else if (corner) hole.distance(x, y) = float(0.5 - std::sqrt(2.0));
+        if (side)
+            hole.distance(x, y) = -0.5f;
+        else if (corner)
+            hole.distance(x, y) = float(0.5 - std::sqrt(2.0));
     };
     for (const BandPixel& c : hole.band)
         for (const Vec2i step : {Vec2i{0, 0}, Vec2i{1, 0}, Vec2i{-1, 0}, Vec2i{0, 1}, Vec2i{0, -1}})

@@ -30,11 +30,11 @@ inline constexpr float kRimReach = 4;
 
 struct Hole {
     Rect window;
-    Rect bounds;              ///< smallest box of the pixels inside; empty if there are none
-    Mask mask;                ///< 1 inside: targets' pixels and band
-    Image<float> floor_depth; ///< z(p): on the mask, metres along camera -z; the target's own depth on target
-                              ///< pixels; +infinity elsewhere
-    Image<float> distance;    ///< signed distance to the rim in pixels, <= 0 exactly where mask = 1; see grow_hole
+    Rect bounds;                 ///< smallest box of the pixels inside; empty if there are none
+    Mask mask;                   ///< 1 inside: targets' pixels and band
+    Image<float> floor_depth;    ///< z(p): on the mask, metres along camera -z; the target's own depth on target
+                                 ///< pixels; +infinity elsewhere
+    Image<float> distance;       ///< signed distance to the rim in pixels, <= 0 exactly where mask = 1; see grow_hole
     std::vector<BandPixel> band; ///< every contour pixel once, in scan order
     [[nodiscard]] bool empty() const { return bounds.empty(); }
 };
