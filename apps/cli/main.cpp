@@ -1,0 +1,331 @@
+// The command line: its flags, and what becomes of errors and interrupts.
+#include <csignal>
+#include <cstdio>
+#include <iterator>
+#include <new>
+#include <system_error>
+
+#include <CLI/CLI.hpp>
+
+#include "config.h"
+#include "options.h"
+#include "porthole/io/files.h"
+#include "porthole/scene/select.h"
+#include "session.h"
+#include "signals.h"
+
+namespace porthole::cli {
+namespace {
+
+/// An option that takes one text and hands it to `read`, whose errors name it.
+template <typename Read>
+CLI::Option* add_read(CLI::App& app, const std::string& names, const std::string& help, const std::string& type,
+                      Read&& read) {
+    const std::string option = names.substr(0, names.find(','));
+    return app
+        .add_option_function<std::string>(names, [read, option](const std::string& text) { read(text, option); }, help)
+        ->type_name(type);
+}
+
+/// A repeatable option: one value each time it is given.
+CLI::Option* add_list(CLI::App& app, const std::string& name, std::vector<std::string>& values, const std::string& help) {
+    return app.add_option(name, values, help)->type_name("SEL")->allow_extra_args(false);
+}
+
+/// An option that takes one of a few words.
+template <typename Enum>
+CLI::Option* add_choice(CLI::App& app, const std::string& name, Enum& value, const std::vector<std::pair<std::string, Enum>>& choices,
+                        const std::string& help) {
+    std::string words;
+    for (const auto& choice : choices) words += (words.empty() ? "" : "|") + choice.first;
+    return add_read(app, name, help, words, [&value, choices, words](const std::string& text, const std::string& option) {
+        for (const auto& choice : choices)
+            if (choice.first == text) {
+                value = choice.second;
+                return;
+            }
+        throw Error(ErrorKind::usage, "E0105", option, "\"" + text.substr(0, 80) + "\" is not one of " + words);
+    });
+}
+
+void add_common(CLI::App& app, CommonOptions& o) {
+    app.add_option("MODEL", o.model, "The model: glTF, GLB, OBJ, PLY or STL; - reads standard input")->required();
+    CLI::Option_group* const reading = app.add_option_group("Reading");
+    add_read(*reading, "--format", "Format of the model, whatever its name", "glb|gltf|obj|ply|stl",
+             [&o](const std::string& text, const std::string& option) {
+                 for (const char* known : {"glb", "gltf", "obj", "ply", "stl"})
+                     if (text == known) {
+                         o.load.format = text;
+                         return;
+                     }
+                 throw Error(ErrorKind::usage, "E0105", option,
+                             "\"" + text.substr(0, 80) + "\" is not one of glb, gltf, obj, ply, stl");
+             });
+    add_read(*reading, "--up", "Axis of the file that points up (default y)", "y|z",
+             [&o](const std::string& text, const std::string& option) { o.load.up = parse_up(text, option); });
+    add_read(*reading, "--units", "Length unit of the file: m, cm, mm, um, km, in, ft or metres", "UNIT",
+             [&o](const std::string& text, const std::string& option) { o.load.metres_per_unit = parse_units(text, option); });
+    reading->add_option("--time", o.load.time, "Seconds into the first animation (default: rest pose)")
+        ->type_name("SECONDS")
+        ->check(CLI::Range(0.0, 1e6));
+    CLI::Option_group* const running = app.add_option_group("Running");
+    running->add_option("--threads", o.threads, "Threads (default: one per processor)")->type_name("N")->check(CLI::Range(1, 1024));
+    add_read(*running, "--max-memory", "Most memory to take, such as 4G; exit 5 beyond it", "BYTES",
+             [&o](const std::string& text, const std::string& option) { o.max_memory = parse_bytes(text, option); });
+    running->add_flag("--quiet", o.quiet, "Say nothing but warnings and errors");
+    running->add_flag("--verbose", o.verbose, "Say more");
+    add_choice<std::string>(*running, "--log", o.log, {{"text", "text"}, {"json", "json"}}, "How messages are written to standard error");
+}
+
+void add_camera(CLI::App& app, CameraParams& c) {
+    CLI::Option_group* const group = app.add_option_group("Camera");
+    group->add_option("--camera", c.name,
+                      "auto, front, back, left, right, top, bottom, iso, or a camera of the file by name or #N "
+                      "(default auto)")
+        ->type_name("VIEW");
+    const auto add_vector = [&](const char* name, std::optional<Vec3d>& v, const char* help) {
+        add_read(*group, name, help, "X,Y,Z",
+                 [&v](const std::string& text, const std::string& option) { v = parse_vector(text, option); });
+    };
+    add_vector("--camera-position", c.position, "Where the eye is, metres; no framing then");
+    add_vector("--camera-focal-point", c.focal_point, "What it looks at (default: the model's centre)");
+    add_vector("--camera-view-up", c.view_up, "What points up in the picture (default 0,1,0)");
+    add_vector("--camera-direction", c.direction, "The way it looks");
+    group->add_option("--camera-azimuth-angle", c.azimuth_deg, "Carries the eye round to the right")->type_name("DEGREES");
+    group->add_option("--camera-elevation-angle", c.elevation_deg, "Carries the eye up")->type_name("DEGREES");
+    group->add_option("--camera-zoom-factor", c.zoom, "2 shows things twice as large")->type_name("FACTOR");
+    group->add_option("--camera-view-angle", c.view_angle_deg, "Vertical angle of view (default 30)")->type_name("DEGREES");
+    group->add_flag("--camera-orthographic", c.orthographic, "Parallel projection");
+    add_choice<Framing>(*group, "--frame", c.frame, {{"auto", Framing::automatic}, {"all", Framing::all}},
+                        "auto: closer until targets span 15 % of the height; all: the whole model (default auto)");
+}
+
+void add_picture(CLI::App& app, PictureOptions& o) {
+    CLI::Option_group* const files = app.add_option_group("Output");
+    files->add_option("-o,--output", o.output, "Picture: .png, .jpg, .jpeg, or - for a PNG on standard output (default out.png)")
+        ->type_name("FILE");
+    files->add_option("--report", o.report_path, "Write what was done as JSON")->type_name("FILE");
+    files->add_flag("--json", o.json, "The report on standard output; no picture unless -o is given");
+    add_read(*files, "--size,--resolution", "Width and height in pixels (default 1920x1080)", "WxH",
+             [&o](const std::string& text, const std::string& option) { o.size = parse_size(text, option); });
+    files->add_option("--bits", o.bits, "Bits per channel of a PNG (default 8)")->type_name("8|16")->check(CLI::IsMember({8, 16}));
+    files->add_flag("--no-clobber", o.no_clobber, "Leave existing files alone: exit 4 instead");
+    CLI::Option_group* const look = app.add_option_group("Look");
+    add_read(*look, "--background", "#rrggbb, white or black (default white)", "COLOR",
+             [&o](const std::string& text, const std::string& option) { o.render.background = parse_color(text, option); });
+    look->add_flag("--no-background", o.no_background, "Transparent where there is no model");
+    look->add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 8)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 4096));
+    look->add_option("--ao-samples", o.render.ao_samples, "Ambient occlusion rays per pixel (default 4, 0: none)")
+        ->type_name("N")
+        ->check(CLI::Range(0, 256));
+    look->add_flag_callback("--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
+    add_choice<std::string>(*look, "--isa", o.isa, {{"avx2", "avx2"}, {"native", "native"}},
+                            "avx2: the same pixels on every machine; native: the fastest");
+    add_camera(app, o.camera);
+}
+
+void add_reveal(CLI::App& app, RevealOptions& o) {
+    add_common(app, o.common);
+    CLI::Option_group* const who = app.add_option_group("Who is seen, who is cut");
+    add_list(*who, "--target", o.target, "Parts that must be seen; may be given several times")->required();
+    add_list(*who, "--keep", o.keep, "Parts that stay whole; may be given several times");
+    add_list(*who, "--cut-only", o.cut_only, "Cut no parts but these; may be given several times");
+    add_choice<bool>(*who, "--see-through", o.keep_see_through, {{"cut", false}, {"keep", true}},
+                     "Glass and other see-through parts: cut or kept whole (default cut)");
+    CLI::Option_group* const hole = app.add_option_group("Hole");
+    add_read(*hole, "--depth", "Width of the band that the hole adds around targets (default 5% of the picture's height)",
+             "N[px|%|mm]",
+             [&o](const std::string& text, const std::string& option) { o.plan.depth = parse_length(text, option); });
+    add_choice<HoleStyle>(*hole, "--style", o.plan.style, {{"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
+                          "hole: straight walls; paper: as the paper builds it (default hole)");
+    add_choice<ContourMethod>(*hole, "--contours", o.plan.contours,
+                              {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},
+                              "How targets' outlines are found (default exact)");
+    add_choice<Tight>(*hole, "--tight", o.plan.tight, {{"refuse", Tight::refuse}, {"open", Tight::open}},
+                      "Targets without room for a band: refused, or opened all the same (default refuse)");
+    hole->add_flag("--strict", o.strict, "Exit 8 if some target is refused or absent, not only if all are");
+    hole->add_option("--debug-dir", o.debug_dir, "Write every value of the plan as a picture")->type_name("DIR");
+    add_picture(app, o.picture);
+    add_choice<Emphasis>(app, "--emphasis", o.picture.render.emphasis,
+                         {{"accent", Emphasis::accent}, {"saturate", Emphasis::saturate}, {"none", Emphasis::none}},
+                         "How targets stand out (default accent)")
+        ->group("Look");
+    app.footer("Selectors: a name, a path, a glob with * and **, re:EXPRESSION, #ID, mat:MATERIAL, name:NAME.\n\n"
+               "Examples:\n"
+               "  porthole reveal engine.glb --target 'rod*' -o rods.png --report rods.json\n"
+               "  porthole reveal body.glb --target heart --keep 'mat:Bone' --camera front --size 2000x3000\n"
+               "  porthole reveal saw.glb --target '#42' --depth 3% --no-background -o - | display -");
+}
+
+void add_render(CLI::App& app, RenderOptions& o) {
+    add_common(app, o.common);
+    add_list(app, "--focus", o.focus, "Frame the picture on these parts, as reveal does on its targets")->group("Camera");
+    add_picture(app, o.picture);
+    app.footer("Examples:\n"
+               "  porthole render engine.glb -o engine.png\n"
+               "  porthole render part.stl --units mm --up z --camera front --size 800x600 -o part.jpg");
+}
+
+void add_parts(CLI::App& app, PartsOptions& o) {
+    add_common(app, o.common);
+    app.add_flag("--json", o.json, "As JSON, with materials, positions and counts of edges")->group("Output");
+    app.footer("Examples:\n"
+               "  porthole parts engine.glb\n"
+               "  porthole parts engine.glb --json | jq -r '.parts[] | select(.closed | not) | .path'");
+}
+
+/// Gives the keys of a --config file to the subcommand that was called. Keys of the other
+/// subcommands are left out, so that one file serves all.
+class JsonConfig : public CLI::Config {
+public:
+    explicit JsonConfig(const CLI::App& app) : app_(app) {}
+
+    std::string to_config(const CLI::App*, bool, bool, std::string) const override { return {}; }
+
+    std::vector<CLI::ConfigItem> from_config(std::istream& in) const override {
+        const std::string text(std::istreambuf_iterator<char>(in), {});
+        const std::string where = app_.get_option("--config")->as<std::string>();
+        std::vector<CLI::ConfigItem> found;
+        for (auto& [key, values] : parse_config(text, where)) {
+            const auto knows = [option = "--" + key](const CLI::App* sub) {
+                return sub->get_option_no_throw(option) != nullptr;
+            };
+            const auto called = app_.get_subcommands();
+            const auto all = app_.get_subcommands([](const CLI::App*) { return true; });
+            if (!called.empty() && knows(called.front())) {
+                CLI::ConfigItem item;
+                item.parents = {called.front()->get_name()};
+                item.name = key;
+                item.inputs = std::move(values);
+                found.push_back(std::move(item));
+            } else if (std::none_of(all.begin(), all.end(), knows)) {
+                throw Error(ErrorKind::usage, "E0104", where + ":/" + key, "there is no such option");
+            }
+        }
+        return found;
+    }
+
+private:
+    const CLI::App& app_;
+};
+
+/// An unknown option with the nearest known ones; CLI11's own words for everything else.
+Error usage_error(const CLI::App& app, const CLI::ParseError& e) {
+    const auto called = app.get_subcommands();
+    const std::string command = called.empty() ? "porthole" : "porthole " + called.front()->get_name();
+    std::string reason = e.what();
+    for (char& c : reason)
+        if (c == '\n') c = ' ';
+    if (dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr || dynamic_cast<const CLI::ArgumentMismatch*>(&e) != nullptr) {
+        std::vector<std::string> known, unknown = app.remaining(true);
+        for (const CLI::App* sub : called)
+            for (const CLI::Option* option : sub->get_options())
+                for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+        if (called.empty())
+            for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) known.push_back(sub->get_name());
+        if (!unknown.empty()) {
+            const std::vector<std::string> near = nearest_names(unknown.front(), known, 2);
+            for (std::size_t i = 0; i < near.size(); ++i) reason += (i ? " or " : "; did you mean ") + near[i];
+            if (!near.empty()) reason += '?';
+        }
+    }
+    return {ErrorKind::usage, "E0101", command, reason + " (" + command + " --help)"};
+}
+
+struct CommandLine {
+    RevealOptions reveal;
+    RenderOptions render;
+    PartsOptions parts;
+};
+
+/// Where pictures go when -o is not given.
+void default_output(PictureOptions& options) {
+    if (options.output.empty() && !options.json && options.report_path != "-") options.output = "out.png";
+}
+
+int run(const CLI::App& app, CommandLine& line, Output& out, const std::stop_token& stop) {
+    const auto start = [&](const CommonOptions& common) {
+        out.configure(common.quiet, common.verbose, common.log == "json");
+        limit_memory(common);
+        return Control{stop, [&out](std::string_view stage, double share) { out.progress(stage, share); }, common.threads};
+    };
+    if (app.got_subcommand("reveal")) {
+        default_output(line.reveal.picture);
+        return run_reveal(line.reveal, out, start(line.reveal.common));
+    }
+    if (app.got_subcommand("render")) {
+        default_output(line.render.picture);
+        return run_render(line.render, out, start(line.render.common));
+    }
+    return run_parts(line.parts, out, start(line.parts.common));
+}
+
+int parse_and_run(int argc, char** argv, Output& out, const std::stop_token& stop) {
+    CommandLine line;
+    CLI::App app("See the parts hidden inside a 3D model without taking it apart.", "porthole");
+    app.set_version_flag("--version", std::string("porthole ") + PORTHOLE_VERSION);
+    app.require_subcommand(1);
+    app.footer("Examples:\n"
+               "  porthole parts engine.glb\n"
+               "  porthole reveal engine.glb --target 'rod*' -o rods.png\n"
+               "  porthole render engine.glb -o engine.png\n\n"
+               "porthole COMMAND --help lists the options of a command; --config FILE reads options from JSON:\n"
+               "  { \"size\": \"1280x720\", \"target\": [\"rod*\"], \"no-shadows\": true }\n\n"
+               "Exit codes: 0 done, 1 a bug, 2 usage, 3 input, 4 output, 5 a limit, 8 nothing revealed,\n"
+               "130 and 143 interrupted.");
+    app.set_config("--config", "", "Read options from a JSON file; the command line wins");
+    app.config_formatter(std::make_shared<JsonConfig>(app));
+    const auto command = [&](const char* name, const char* help) {
+        CLI::App* const sub = app.add_subcommand(name, help);
+        sub->fallthrough(); // --config after the command
+        return sub;
+    };
+    add_reveal(*command("reveal", "Open a hole so that parts inside can be seen"), line.reveal);
+    add_render(*command("render", "Draw the plain picture"), line.render);
+    add_parts(*command("parts", "List the parts: ids, triangles, closed or open, size"), line.parts);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::Success& e) { // --help, --version
+        return app.exit(e);
+    } catch (const CLI::ParseError& e) {
+        if (argc <= 1) {
+            std::fputs(app.help().c_str(), stderr);
+            return kExitUsage;
+        }
+        throw usage_error(app, e);
+    }
+    return run(app, line, out, stop);
+}
+
+} // namespace
+} // namespace porthole::cli
+
+int main(int argc, char** argv) {
+    using namespace porthole;
+    using namespace porthole::cli;
+    const Signals signals;
+    Output out;
+    int code = kExitBug;
+    const auto fail = [&](ErrorKind kind, const char* error_code, const std::string& where, const std::string& reason) {
+        out.error({kind, error_code, where, reason});
+        code = exit_code(kind);
+    };
+    try {
+        code = parse_and_run(argc, argv, out, signals.token());
+    } catch (const Cancelled&) {
+        fail(ErrorKind::bug, "E0903", "", "interrupted");
+    } catch (const Error& e) {
+        out.error(e);
+        code = exit_code(e.kind);
+    } catch (const std::bad_alloc&) {
+        fail(ErrorKind::limit, "E0902", "", "out of memory");
+    } catch (const std::system_error& e) {
+        // The only one that good programs meet: no further thread can be started.
+        fail(ErrorKind::limit, "E0904", "", std::string("the system refuses resources: ") + e.what());
+    } catch (const std::exception& e) {
+        fail(ErrorKind::bug, "E0001", "", std::string("this is a bug: ") + e.what());
+    }
+    return signals.received() != 0 && code != kExitDone ? 128 + signals.received() : code;
+}

@@ -1,0 +1,21 @@
+// Pictures and reports on their way to files.
+#pragma once
+
+#include "options.h"
+
+namespace porthole::cli {
+
+/// Finds out before the work whether its results can be written: extensions, folders,
+/// --no-clobber, and whether two of them share standard output or a file.
+/// @throws Error usage E0106, E0107; output E0801, E0804; limit E0901 when the picture's size
+///         does not fit into the memory allowed.
+void check_outputs(const PictureOptions& options, std::uint64_t max_memory);
+
+/// Encodes `frame` as its output's extension says and writes it.
+/// @throws Error output E08xx.
+void write_picture(const Frame& frame, const PictureOptions& options);
+
+/// The report to --report and --json, whichever were asked for. @throws Error output E08xx.
+void write_report(const Report& report, const PictureOptions& options);
+
+} // namespace porthole::cli

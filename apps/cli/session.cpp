@@ -1,0 +1,67 @@
+#include "session.h"
+
+#include <algorithm>
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace porthole::cli {
+
+int exit_code(ErrorKind kind) {
+    switch (kind) {
+    case ErrorKind::usage: return kExitUsage;
+    case ErrorKind::input: return kExitInput;
+    case ErrorKind::output: return kExitOutput;
+    case ErrorKind::limit: return kExitLimit;
+    case ErrorKind::bug: break;
+    }
+    return kExitBug;
+}
+
+std::uint64_t memory_limit(const CommonOptions& options) {
+    if (options.max_memory != 0) return options.max_memory;
+    const auto pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGE_SIZE);
+    if (pages <= 0 || page <= 0) return options.load.max_bytes;
+    return std::min(options.load.max_bytes, std::uint64_t(pages) * std::uint64_t(page) / 4 * 3);
+}
+
+void limit_memory(const CommonOptions& options) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    (void)options; // their shadow memory alone is above any limit
+#else
+    if (options.max_memory == 0) return;
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_DATA, &limit) != 0) return;
+    limit.rlim_cur = std::min<rlim_t>(options.max_memory, limit.rlim_max);
+    ::setrlimit(RLIMIT_DATA, &limit);
+#endif
+}
+
+Scene load(const CommonOptions& options, Output& out, const Control& control) {
+    LoadParams params = options.load;
+    params.max_bytes = memory_limit(options);
+    out.progress("load", 0);
+    Scene scene = load_scene(options.model, params, control);
+    out.done(scene.format + ", " + with_commas(std::int64_t(scene.parts.size())) + " parts, " +
+             with_commas(std::int64_t(triangle_count(scene))) + " triangles");
+    for (const Warning& warning : scene.warnings) out.warning(warning);
+    return scene;
+}
+
+void require_parts(const Scene& scene) {
+    if (scene.parts.empty() || triangle_count(scene) == 0)
+        throw Error(ErrorKind::input, "E0204", scene.source, "holds no triangles: there is nothing to draw");
+}
+
+void fill_report(Report& report, const char* command, const Scene& scene, const PictureOptions& picture) {
+    report.version = PORTHOLE_VERSION;
+    report.command = command;
+    report.model_path = scene.source;
+    report.parts = std::int64_t(scene.parts.size());
+    report.triangles = std::int64_t(triangle_count(scene));
+    report.warnings.insert(report.warnings.begin(), scene.warnings.begin(), scene.warnings.end());
+    report.run.isa = picture.isa;
+    rusage usage{};
+    if (::getrusage(RUSAGE_SELF, &usage) == 0) report.run.peak_bytes = std::int64_t(usage.ru_maxrss) * 1024;
+}
+
+} // namespace porthole::cli
