@@ -36,7 +36,7 @@ namespace porthole {
 [[nodiscard]] Vec3f ggx(Vec3f f0, float alpha, Vec3f n, Vec3f wi, Vec3f wo);
 
 /// Directional albedo of the lobe as f0 * scale + bias: what a white sky would be reflected as.
-/// Karis' analytic fit, "Physically Based Shading on Mobile" (2014); within .03 of the integral.
+/// From a table that is integrated once; within .02 of the integral.
 struct LobeAlbedo {
     float scale = 0, bias = 0;
     [[nodiscard]] Vec3f of(Vec3f f0) const { return {f0.x * scale + bias, f0.y * scale + bias, f0.z * scale + bias}; }

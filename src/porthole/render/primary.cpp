@@ -21,6 +21,9 @@ void store_hit(const RayHit16& rays, int lane, float depth, Seen16& seen) {
     seen.depth[lane] = depth;
 }
 
+/// How far two computed depths of one surface may lie apart.
+float rounding(float depth) { return 8 * std::numeric_limits<float>::epsilon() * depth; }
+
 } // namespace
 
 Seen16 Camera::trace(const Samples16& samples, RayCounts& rays) const {
@@ -103,18 +106,18 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         if (!seen.on_target[i]) cut_set[i] = start(CutRole::cut_set);
         // What lies on the target counts as behind it.
         if (seen.on_target[i])
-            seen.depth[i] = target_depth[i] -
-                            std::max(tolerance_, 8 * std::numeric_limits<float>::epsilon() * target_depth[i]);
+            seen.depth[i] = target_depth[i] - std::max(tolerance_, rounding(target_depth[i]));
     }
-    if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, seen, rays);
-    if (has_cut_set_) trace_role(kMaskCutSet, cut_set, depth_per_t, seen, rays);
-    if (has_loose_) trace_role(kMaskLoose, loose, depth_per_t, seen, rays);
+    // Where the underside of a cut wall lies on the floor it stood on, the floor is seen.
+    if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, 0, seen, rays);
+    if (has_loose_) trace_role(kMaskLoose, loose, depth_per_t, 0, seen, rays);
+    if (has_cut_set_) trace_role(kMaskCutSet, cut_set, depth_per_t, tolerance_, seen, rays);
     for (int i = 0; i < kLanes; ++i)
         if (seen.on_target[i]) seen.depth[i] = target_depth[i];
 }
 
 void Camera::trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],
-                        Seen16& seen, RayCounts& rays) const {
+                        float tolerance, Seen16& seen, RayCounts& rays) const {
     RayHit16 packet;
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {
@@ -133,7 +136,8 @@ void Camera::trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const 
         if (!packet.hit(i)) continue;
         const float depth = packet.tfar[i] * depth_per_t[i];
         // Strictly nearer: on a tie the role that was asked earlier stays.
-        if (!(depth < seen.depth[i])) continue;
+        const float margin = tolerance > 0 ? std::max(tolerance, rounding(depth)) : 0.0f;
+        if (!(depth < seen.depth[i] - margin)) continue;
         store_hit(packet, i, depth, seen);
         seen.on_target[i] = false;
     }

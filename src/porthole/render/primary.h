@@ -36,8 +36,8 @@ public:
 
 private:
     void trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const;
-    void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes], Seen16& seen,
-                    RayCounts& rays) const;
+    void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes], float tolerance,
+                    Seen16& seen, RayCounts& rays) const;
 
     const Bvh* bvh_;
     const Bvh* targets_;

@@ -1,0 +1,457 @@
+#include "porthole/render/render.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "porthole/render/test_scene.h"
+#include "porthole/trace/visibility.h"
+
+namespace porthole {
+namespace {
+
+using test::add_part;
+using test::box_mesh;
+using test::look_at;
+using test::matte;
+using test::quad_mesh;
+using test::sphere_mesh;
+
+bool same_bits(const Frame& a, const Frame& b) {
+    const auto equal = [](const auto& x, const auto& y) {
+        return x.window() == y.window() &&
+               std::memcmp(x.pixels().data(), y.pixels().data(), x.pixels().size() * sizeof(x.pixels()[0])) == 0;
+    };
+    return equal(a.color, b.color) && equal(a.ids.id, b.ids.id) && equal(a.ids.depth, b.ids.depth);
+}
+
+bool same_color(Vec4f a, Vec4f b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+/// A floor, a wall, boxes and spheres of several materials, some of them glass.
+Scene still_life() {
+    Scene s;
+    s.materials = {matte({0.8f, 0.8f, 0.8f}), matte({0.7f, 0.2f, 0.1f}), matte({0.9f, 0.9f, 0.9f}), matte({0.5f, 0.9f, 0.6f}),
+                   matte({0.2f, 0.3f, 0.8f})};
+    s.materials[2].metallic = 1, s.materials[2].roughness = 0.05f;
+    s.materials[3].transmission = 1, s.materials[3].thickness = 0.1f, s.materials[3].roughness = 0;
+    s.materials[4].alpha_mode = AlphaMode::blend, s.materials[4].base_color.w = 0.4f;
+    add_part(s, quad_mesh({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}, 0), "floor");
+    add_part(s, box_mesh({-1, 0, -0.5f}, {-0.4f, 0.6f, 0.1f}, 1), "box");
+    add_part(s, sphere_mesh({0.3f, 0.4f, -0.6f}, 0.4f, 24, 2), "metal");
+    add_part(s, sphere_mesh({0.5f, 0.25f, 0.4f}, 0.25f, 24, 3), "glass");
+    add_part(s, quad_mesh({-0.9f, 0.05f, 0.6f}, {0.8f, 0, 0}, {0, 0.7f, 0}, 4), "film");
+    return s;
+}
+
+struct Built {
+    Scene scene;
+    MeshBvhs meshes;
+    Bvh bvh;
+    explicit Built(Scene s) : scene(std::move(s)), meshes(build_mesh_bvhs(scene)), bvh(build_bvh(meshes, all_parts(scene))) {}
+    Built(const Built&) = delete;
+    Built& operator=(const Built&) = delete;
+    [[nodiscard]] Frame draw(const View& view, const RenderParams& params = {}, int threads = 2) const {
+        Control control;
+        control.threads = threads;
+        return render(bvh, nullptr, view, params, nullptr, nullptr, control);
+    }
+};
+
+TEST(Render, GivesTheSameBitsForAnyNumberOfThreads) {
+    const Built b(still_life());
+    const View view = look_at({0.4f, 1.2f, 3}, {0, 0.3f, 0}, 203, 151);
+    const Frame one = b.draw(view, {}, 1);
+    EXPECT_TRUE(same_bits(one, b.draw(view, {}, 2)));
+    EXPECT_TRUE(same_bits(one, b.draw(view, {}, 7)));
+    EXPECT_TRUE(same_bits(one, b.draw(view, {}, 1)));
+}
+
+TEST(Render, IdsAreThePlainIdBuffer) {
+    const Built b(still_life());
+    for (const bool orthographic : {false, true}) {
+        View view = look_at({0.4f, 1.2f, 3}, {0, 0.3f, 0}, 203, 151);
+        view.orthographic = orthographic;
+        if (orthographic) view.half_height = 1;
+        const Frame f = b.draw(view);
+        const IdBuffer ids = trace_ids(b.bvh, view, view.window());
+        EXPECT_TRUE(f.ids == ids);
+        // Where nothing is hit, nothing is drawn, unless an edge sample of the pixel hits.
+        for (int y = 1; y < 150; ++y)
+            for (int x = 1; x < 202; ++x) {
+                bool none = true;
+                for (int dy = -1; dy <= 1; ++dy)
+                    for (int dx = -1; dx <= 1; ++dx) none &= ids.id(x + dx, y + dy) == kNoPart;
+                EXPECT_TRUE(!none || same_color(f.color(x, y), {0, 0, 0, 0})) << x << ' ' << y;
+            }
+    }
+}
+
+TEST(Render, EveryValueIsADisplayColor) {
+    const Built b(still_life());
+    const Frame f = b.draw(look_at({0.4f, 1.2f, 3}, {0, 0.3f, 0}, 160, 120));
+    for (const Vec4f& c : f.color.pixels())
+        for (const float v : {c.x, c.y, c.z, c.w}) {
+            ASSERT_GE(v, 0.0f);
+            ASSERT_LE(v, 1.0f + 1e-5f);
+        }
+}
+
+TEST(Render, MoreSamplesChangeOnlyPixelsAtEdges) {
+    Scene s;
+    s.materials = {matte({0.8f, 0.8f, 0.8f}), matte({0.1f, 0.2f, 0.7f})};
+    add_part(s, quad_mesh({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 0), "wall");
+    add_part(s, box_mesh({-0.5f, -0.5f, 0.5f}, {0.5f, 0.5f, 0.6f}, 1), "box");
+    const Built b(std::move(s));
+    View view = look_at({0.02f, 0.05f, 6}, {0, 0, 0}, 128, 128, 0.3f);
+    RenderParams one;
+    one.samples = 1;
+    const Frame coarse = b.draw(view, one), fine = b.draw(view);
+    int changed = 0, partly = 0;
+    for (int y = 1; y < 127; ++y)
+        for (int x = 1; x < 127; ++x) {
+            if (same_color(coarse.color(x, y), fine.color(x, y))) continue;
+            ++changed;
+            // A neighbour sees another part, or is lit differently.
+            float difference = 0;
+            bool other = false;
+            for (const Vec2i d : {Vec2i{1, 0}, Vec2i{-1, 0}, Vec2i{0, 1}, Vec2i{0, -1}}) {
+                other |= coarse.ids.id(x, y) != coarse.ids.id(x + d.x, y + d.y);
+                difference = std::max(difference, std::abs(coarse.color(x, y).y - coarse.color(x + d.x, y + d.y).y));
+            }
+            EXPECT_TRUE(other || difference > 0.01f) << x << ' ' << y;
+            partly += other;
+        }
+    EXPECT_GT(partly, 60); // the box's outline
+    EXPECT_LT(changed, 128 * 128 / 8);
+    EXPECT_GT(fine.rays.primary, coarse.rays.primary);
+    EXPECT_LT(fine.rays.primary, coarse.rays.primary * 2);
+}
+
+TEST(Render, EdgeSamplesApproachTheCoverage) {
+    // A black-on-nothing half plane through a pixel row at a slope: alpha is the covered share.
+    Scene s;
+    s.materials = {matte({0.5f, 0.5f, 0.5f})};
+    add_part(s, quad_mesh({-5, -5, 0}, {10, 1, 0}, {0, 4.6f, 0}, 0), "half");
+    const Built b(std::move(s));
+    View view = look_at({0, 0, 5}, {0, 0, 0}, 64, 64);
+    view.orthographic = true;
+    view.half_height = 1;
+    RenderParams params;
+    params.samples = 64;
+    const Frame f = b.draw(view, params);
+    int partly = 0;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) {
+            // The upper edge: world y = -0.4 + (x + 5) / 10.
+            double covered = 0;
+            const int n = 32;
+            for (int i = 0; i < n; ++i)
+                for (int j = 0; j < n; ++j) {
+                    const double wx = (x + (i + 0.5) / n - 32) / 32, wy = (32 - (y + (j + 0.5) / n)) / 32;
+                    covered += wy < -0.4 + (wx + 5) / 10;
+                }
+            EXPECT_NEAR(double(f.color(x, y).w), covered / (n * n), 0.04) << x << ' ' << y;
+            partly += covered > 0 && covered < n * n;
+        }
+    EXPECT_GE(partly, 64);
+}
+
+TEST(Render, AMirrorShowsWhatStandsBeforeIt) {
+    // A mirror at 45 degrees in front of the camera shows a red panel that stands to the side.
+    Scene s;
+    s.materials = {matte({1, 1, 1}), matte({0.85f, 0.03f, 0.03f})};
+    s.materials[0].metallic = 1, s.materials[0].roughness = 0;
+    add_part(s, quad_mesh({-1, -1, 1}, {2, 0, -2}, {0, 2, 0}, 0), "mirror"); // in the plane x + z = 0
+    add_part(s, quad_mesh({6, -0.5f, -0.5f}, {0, 0, 1}, {0, 1, 0}, 1), "panel");
+    const Built b(std::move(s));
+    const View view = look_at({0, 0, 4}, {0, 0, 0}, 96, 96, 0.3f);
+    const Frame f = b.draw(view);
+    int red = 0, wrong = 0;
+    for (int y = 0; y < 96; ++y)
+        for (int x = 0; x < 96; ++x) {
+            if (f.ids.id(x, y) != PartId{0}) continue;
+            const Ray ray = view.ray(float(x) + 0.5f, float(y) + 0.5f);
+            const float t = -(ray.origin.x + ray.origin.z) / (ray.direction.x + ray.direction.z);
+            const Vec3f p = ray.origin + ray.direction * t;
+            const Vec3f mirrored{-ray.direction.z, ray.direction.y, -ray.direction.x};
+            const Vec3f q = p + mirrored * ((6 - p.x) / mirrored.x);
+            const bool inside = std::abs(q.y) < 0.45f && std::abs(q.z) < 0.45f;
+            const bool outside = std::abs(q.y) > 0.55f || std::abs(q.z) > 0.55f;
+            const bool looks_red = f.color(x, y).x > 3 * f.color(x, y).y;
+            red += looks_red;
+            wrong += (inside && !looks_red) || (outside && looks_red);
+        }
+    EXPECT_EQ(wrong, 0);
+    EXPECT_GT(red, 100);
+    EXPECT_GT(f.rays.reflection, 1000);
+}
+
+TEST(Render, BlendedSurfacesAreLaidOverWhatIsBehind) {
+    const auto picture = [](float alpha, bool behind, bool film) {
+        Scene s;
+        s.materials = {matte({0.2f, 0.3f, 0.8f}), matte({0.8f, 0.1f, 0.1f})};
+        s.materials[0].alpha_mode = AlphaMode::blend;
+        s.materials[0].base_color.w = alpha;
+        // Unlit, so that the numbers can be written down.
+        s.materials[0].unlit = s.materials[1].unlit = true;
+        if (film) add_part(s, quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0), "film");
+        if (behind) add_part(s, quad_mesh({-2, -2, -1}, {4, 0, 0}, {0, 4, 0}, 1), "wall");
+        return Built(std::move(s)).draw(look_at({0, 0, 4}, {0, 0, 0}, 16, 16, 0.1f)).color(8, 8);
+    };
+    const Vec4f over = picture(0.25f, true, true);
+    EXPECT_NEAR(over.x, 0.25f * 0.2f + 0.75f * 0.8f, 1e-5f);
+    EXPECT_NEAR(over.z, 0.25f * 0.8f + 0.75f * 0.1f, 1e-5f);
+    EXPECT_NEAR(over.w, 1.0f, 1e-6f);
+    const Vec4f alone = picture(0.25f, false, true);
+    EXPECT_NEAR(alone.x, 0.25f * 0.2f, 1e-5f);
+    EXPECT_NEAR(alone.w, 0.25f, 1e-6f);
+}
+
+TEST(Render, ColouredGlassCastsAColouredShadow) {
+    const auto floor_color = [](int kind) {
+        Scene s;
+        s.materials = {matte({0.8f, 0.8f, 0.8f}), matte({1, 0.1f, 0.1f})};
+        if (kind == 2) s.materials[1].transmission = 1;
+        add_part(s, quad_mesh({-20, 0, 20}, {40, 0, 0}, {0, 0, -40}, 0), "floor");
+        // A pane large enough for the key, out of the camera's sight, above the point looked at.
+        if (kind > 0) add_part(s, quad_mesh({-8, 6, 8}, {16, 0, 0}, {0, 0, -16}, 1), "pane");
+        RenderParams params;
+        params.ao_samples = 0;
+        return Built(std::move(s)).draw(look_at({0, 2, 3}, {0, 0, 0}, 16, 16, 0.05f), params).color(8, 8);
+    };
+    const Vec4f open = floor_color(0), shadow = floor_color(1), tinted = floor_color(2);
+    EXPECT_LT(shadow.x, 0.8f * open.x);
+    EXPECT_NEAR(shadow.x, shadow.y, 0.02f);
+    // Red passes, green does not.
+    EXPECT_GT(tinted.x, shadow.x + 0.8f * (open.x - shadow.x));
+    EXPECT_LT(tinted.y, shadow.y + 0.2f * (open.y - shadow.y));
+}
+
+TEST(Render, AmbientOcclusionReachesNoFartherThanItsRadius) {
+    // A plate above a floor, twice; the scene's size, which sets the radius, stays the same.
+    const auto brightness = [](float height) {
+        Scene s;
+        s.materials = {matte({0.8f, 0.8f, 0.8f})};
+        add_part(s, quad_mesh({-10, 0, 10}, {20, 0, 0}, {0, 0, -20}, 0), "floor");
+        add_part(s, box_mesh({-2, height, -2}, {2, height + 0.01f, 2}, 0), "plate");
+        RenderParams params;
+        params.shadows = false;
+        return Built(std::move(s)).draw(look_at({0, 0.2f, 1.9f}, {0, 0, 0}, 16, 16, 0.05f), params).color(8, 8).y;
+    };
+    // Radius 12 % of 14.1 = 1.7.
+    EXPECT_LT(brightness(0.5f), 0.9f * brightness(6.0f));
+    EXPECT_EQ(brightness(3.0f), brightness(6.0f));
+}
+
+TEST(Render, AFlatPictureHasNeitherShadowNorLight) {
+    const Built b(still_life());
+    RenderParams params;
+    params.shading = Shading::flat;
+    params.samples = 1;
+    const View view = look_at({0, 0.3f, 4}, {0, 0.3f, 0}, 64, 64);
+    const Frame f = b.draw(view, params);
+    EXPECT_EQ(f.rays.shadow + f.rays.ambient + f.rays.reflection + f.rays.refraction, 0);
+    int film = 0;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) {
+            if (f.ids.id(x, y) != PartId{4}) continue;
+            ++film;
+            // It faces +z: colour times the cosine to the viewer, opaque as ids are.
+            const float facing = -view.ray(float(x) + 0.5f, float(y) + 0.5f).direction.z;
+            EXPECT_NEAR(f.color(x, y).x, 0.2f * facing, 1e-4f);
+            EXPECT_NEAR(f.color(x, y).z, 0.8f * facing, 1e-4f);
+            EXPECT_EQ(f.color(x, y).w, 1.0f);
+        }
+    EXPECT_GT(film, 50);
+}
+
+TEST(Render, AWhiteWallFacingTheViewerStaysBelowClipping) {
+    Scene s;
+    s.materials = {matte({1, 1, 1})};
+    add_part(s, quad_mesh({-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0), "wall");
+    const Vec4f c = Built(std::move(s)).draw(look_at({0, 0, 4}, {0, 0, 0}, 16, 16, 0.1f)).color(8, 8);
+    EXPECT_GT(c.y, 0.75f);
+    EXPECT_LT(c.y, 0.95f);
+}
+
+TEST(Render, BadParametersAreNamed) {
+    const Built b(still_life());
+    const View view = look_at({0, 0, 4}, {0, 0, 0}, 8, 8);
+    RenderParams params;
+    params.samples = 0;
+    try {
+        (void)b.draw(view, params);
+        FAIL();
+    } catch (const Error& e) {
+        EXPECT_EQ(e.code, "E0130");
+        EXPECT_EQ(e.where, "samples");
+        EXPECT_EQ(e.kind, ErrorKind::usage);
+    }
+}
+
+TEST(Render, StopsWhenAsked) {
+    const Built b(still_life());
+    std::stop_source source;
+    Control control;
+    control.stop = source.get_token();
+    control.threads = 2;
+    double last = 0;
+    control.progress = [&](std::string_view stage, double share) {
+        EXPECT_EQ(stage, "render");
+        last = share;
+        source.request_stop();
+    };
+    control.threads = 1;
+    EXPECT_THROW((void)render(b.bvh, nullptr, look_at({0, 1, 4}, {0, 0, 0}, 512, 512), {}, nullptr, nullptr, control), Cancelled);
+    EXPECT_LT(last, 0.3);
+}
+
+// A box inside a box; the hole is a disc, made by hand.
+struct BoxInBox {
+    Scene scene;
+    PartId outer, inner, bolt, floor;
+    std::vector<CutRole> role;
+    View view;
+    Cut cut;
+
+    BoxInBox() {
+        scene.materials = {matte({0.7f, 0.7f, 0.72f}), matte({0.72f, 0.7f, 0.7f}), matte({0.3f, 0.5f, 0.3f})};
+        outer = add_part(scene, box_mesh({-1, -1, -1}, {1, 1, 1}, 0), "outer");
+        inner = add_part(scene, box_mesh({-0.3f, -0.3f, -0.3f}, {0.3f, 0.3f, 0.3f}, 1), "inner");
+        bolt = add_part(scene, box_mesh({-0.1f, 0.3f, 1}, {0.1f, 0.5f, 1.1f}, 2), "bolt");
+        floor = add_part(scene, quad_mesh({-4, -1.01f, 4}, {8, 0, 0}, {0, 0, -8}, 2), "floor");
+        role = {CutRole::cut_set, CutRole::fixed, CutRole::loose, CutRole::loose};
+        view = look_at({0.5f, 0.8f, 5}, {0, 0, 0}, 160, 120, 0.3f);
+        // A disc of 30 pixels around the middle; floor depth: that of the inner box's front, flat.
+        cut.view = view;
+        cut.role = role;
+        const Rect window{45, 25, 115, 95};
+        cut.distance = Image<float>(window);
+        cut.cut_depth = Image<float>(window, 4.6f);
+        cut.loose_depth = Image<float>(window, 4.3f);
+        for (int y = window.y0; y < window.y1; ++y)
+            for (int x = window.x0; x < window.x1; ++x) {
+                cut.distance(x, y) = std::hypot(float(x) - 79.5f, float(y) - 59.5f) - 30.0f;
+            }
+    }
+};
+
+struct OpenedBox : BoxInBox {
+    MeshBvhs meshes;
+    Bvh whole, targets;
+    OpenedBox()
+        : meshes(build_mesh_bvhs(scene)), whole(build_bvh(meshes, all_parts(scene), role)),
+          targets(build_bvh(meshes, std::vector<PartId>{inner})) {}
+    OpenedBox(const OpenedBox&) = delete;
+    OpenedBox& operator=(const OpenedBox&) = delete;
+};
+
+TEST(RenderCut, OutsideTheHoleThePictureIsThePlainOneBitForBit) {
+    const OpenedBox b;
+    const Frame plain = render(b.whole, nullptr, b.view, {}, nullptr, nullptr);
+    const Frame open = render(b.whole, &b.targets, b.view, {}, &b.cut, &plain);
+    int inside = 0, changed = 0, rim = 0;
+    for (int y = 0; y < b.view.height; ++y)
+        for (int x = 0; x < b.view.width; ++x) {
+            // No sample of a pixel whose centre is farther than its diagonal lies in the hole.
+            const float d = std::hypot(float(x) - 79.5f, float(y) - 59.5f) - 30.0f;
+            const bool same = same_color(plain.color(x, y), open.color(x, y));
+            if (d > 0.8f) {
+                EXPECT_TRUE(same) << x << ' ' << y;
+                EXPECT_EQ(plain.ids.id(x, y), open.ids.id(x, y));
+                EXPECT_EQ(plain.ids.depth(x, y), open.ids.depth(x, y));
+            } else if (d < -0.8f) {
+                ++inside;
+                changed += !same;
+                EXPECT_NE(open.ids.id(x, y), b.bolt);
+            } else {
+                ++rim;
+            }
+        }
+    EXPECT_GT(inside, 2000);
+    EXPECT_GT(changed, inside * 95 / 100);
+    EXPECT_GT(rim, 100);
+    EXPECT_EQ(open.ids.id(79, 59), b.inner);
+}
+
+TEST(RenderCut, InsideTheHoleEachPixelShowsWhatTheCutLeaves) {
+    const OpenedBox b;
+    const Frame plain = render(b.whole, nullptr, b.view, {}, nullptr, nullptr);
+    RenderParams params;
+    const Frame open = render(b.whole, &b.targets, b.view, params, &b.cut, &plain);
+    RayHit16 packet;
+    for (int y = 0; y < b.view.height; ++y)
+        for (int x = 0; x < b.view.width; ++x) {
+            if (b.cut.distance.at_or(x, y, 1) > 0) continue;
+            const Ray ray = b.view.ray(float(x) + 0.5f, float(y) + 0.5f);
+            for (int i = 0; i < kLanes; ++i) packet.clear(i);
+            // Oracle: the target if there is one, else the nearest surface that removes() leaves.
+            packet.set(0, ray.origin, ray.direction, 0, kInfinity);
+            intersect(b.targets, packet, Coherence::incoherent);
+            if (!packet.hit(0)) {
+                packet.set(0, ray.origin, ray.direction, 0, kInfinity);
+                intersect_cut(b.whole, packet, 0, &b.cut);
+            }
+            ASSERT_EQ(open.ids.id(x, y), packet.hit(0) ? packet.part(0) : kNoPart) << x << ' ' << y;
+            if (!packet.hit(0)) continue;
+            EXPECT_NEAR(open.ids.depth(x, y), packet.tfar[0] * ray.depth_per_t, 1e-5f);
+        }
+}
+
+TEST(RenderCut, LightReachesTheHoleAndTheTargetStandsOut) {
+    const OpenedBox b;
+    const Frame plain = render(b.whole, nullptr, b.view, {}, nullptr, nullptr);
+    const Frame open = render(b.whole, &b.targets, b.view, {}, &b.cut, &plain);
+    // Grey in grey: the target gets the accent, and it is lit.
+    const Vec4f accent = open.color(79, 59);
+    EXPECT_GT(accent.x, 0.5f);
+    EXPECT_GT(accent.x, 3 * accent.z);
+    RenderParams params;
+    params.emphasis = Emphasis::none;
+    const Vec4f own = render(b.whole, &b.targets, b.view, params, &b.cut, &plain).color(79, 59);
+    EXPECT_NEAR(own.x, own.z, 0.05f);
+    EXPECT_GT(own.y, 0.5f); // the closed box around it would leave under .35
+}
+
+TEST(RenderCut, ThreadsDoNotMatterThere) {
+    const OpenedBox b;
+    Control control;
+    const Frame plain = render(b.whole, nullptr, b.view, {}, nullptr, nullptr);
+    control.threads = 1;
+    const Frame one = render(b.whole, &b.targets, b.view, {}, &b.cut, &plain, control);
+    for (const int threads : {2, 7}) {
+        control.threads = threads;
+        EXPECT_TRUE(same_bits(one, render(b.whole, &b.targets, b.view, {}, &b.cut, &plain, control)));
+    }
+}
+
+TEST(RenderCut, AKeptPartInFrontOfATargetStaysInFrontAndOneThatTouchesItIsBehind) {
+    BoxInBox b;
+    // A post before the target, kept; and a skin that coincides with the target's front.
+    const PartId post = add_part(b.scene, box_mesh({-0.02f, -0.2f, 0.6f}, {0.02f, 0.2f, 0.65f}, 2), "post");
+    const PartId skin = add_part(b.scene, quad_mesh({-0.3f, -0.3f, 0.3f}, {0.6f, 0, 0}, {0, 0.6f, 0}, 2), "skin");
+    b.cut.role.push_back(CutRole::fixed);
+    b.cut.role.push_back(CutRole::fixed);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Bvh whole = build_bvh(meshes, all_parts(b.scene), b.cut.role);
+    const Bvh targets = build_bvh(meshes, std::vector<PartId>{b.inner});
+    const Frame plain = render(whole, nullptr, b.view, {}, nullptr, nullptr);
+    const Frame open = render(whole, &targets, b.view, {}, &b.cut, &plain);
+    int posts = 0, skins = 0, inner = 0;
+    for (const PartId id : open.ids.id.pixels()) posts += id == post, skins += id == skin, inner += id == b.inner;
+    EXPECT_GT(posts, 20);
+    EXPECT_EQ(skins, 0);
+    EXPECT_GT(inner, 300);
+}
+
+TEST(RenderCut, AnEmptyCutLeavesThePlainPicture) {
+    const OpenedBox b;
+    const Frame plain = render(b.whole, nullptr, b.view, {}, nullptr, nullptr);
+    const Cut none;
+    const Frame open = render(b.whole, &b.targets, b.view, {}, &none, &plain);
+    EXPECT_TRUE(same_bits(plain, open));
+    EXPECT_EQ(open.rays.primary, 0);
+}
+
+} // namespace
+} // namespace porthole
