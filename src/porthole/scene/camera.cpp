@@ -75,6 +75,25 @@ double resolved_extent(const Bounds3d& b) {
     return far_off > 0 ? 1e-4 * far_off : 1e-3;
 }
 
+/// Where points fall in the picture plane: tangents, or metres when orthographic.
+struct Window2 {
+    double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
+    [[nodiscard]] Vec2d centre() const { return {(x0 + x1) / 2, (y0 + y1) / 2}; }
+    [[nodiscard]] Vec2d half() const { return {(x1 - x0) / 2, (y1 - y0) / 2}; }
+};
+
+Window2 seen_at(const Points& points, Vec3d eye, bool orthographic) {
+    Window2 w;
+    for (const Vec3d p : points) {
+        // Targets lie before the eye; the bound only keeps an approximate hull from making NaN.
+        const double scale = orthographic ? 1.0 : 1.0 / std::max(eye.z - p.z, 1e-9 * std::abs(eye.z) + 1e-30);
+        const double x = (p.x - eye.x) * scale, y = (p.y - eye.y) * scale;
+        w.x0 = std::min(w.x0, x), w.x1 = std::max(w.x1, x);
+        w.y0 = std::min(w.y0, y), w.y1 = std::max(w.y1, y);
+    }
+    return w;
+}
+
 /// The nearest placement that holds all points with the border. If `centre` is given the
 /// picture's centre stays on it.
 Placement fit(const Points& points, double aspect, double tangent, bool orthographic, const Vec3d* centre) {
@@ -105,26 +124,16 @@ Placement fit(const Points& points, double aspect, double tangent, bool orthogra
         eye.z = std::max((right + left) / (2 * tx), (top + bottom) / (2 * ty));
     }
     eye.z = std::max(eye.z, box.upper.z + pad / ty);
-    return {eye, tangent};
-}
-
-/// Where points fall in the picture plane: tangents, or metres when orthographic.
-struct Window2 {
-    double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-    [[nodiscard]] Vec2d centre() const { return {(x0 + x1) / 2, (y0 + y1) / 2}; }
-    [[nodiscard]] Vec2d half() const { return {(x1 - x0) / 2, (y1 - y0) / 2}; }
-};
-
-Window2 seen_at(const Points& points, Vec3d eye, bool orthographic) {
-    Window2 w;
-    for (const Vec3d p : points) {
-        // Targets lie before the eye; the bound only keeps an approximate hull from making NaN.
-        const double scale = orthographic ? 1.0 : 1.0 / std::max(eye.z - p.z, 1e-9 * std::abs(eye.z) + 1e-30);
-        const double x = (p.x - eye.x) * scale, y = (p.y - eye.y) * scale;
-        w.x0 = std::min(w.x0, x), w.x1 = std::max(w.x1, x);
-        w.y0 = std::min(w.y0, y), w.y1 = std::max(w.y1, y);
+    if (centre) return {eye, tangent};
+    // On the axis that does not bind there is room: the same border on both sides of it.
+    const bool wide = right + left > (top + bottom) * aspect;
+    for (int pass = 0; pass < 6; ++pass) {
+        const Vec2d off = seen_at(points, eye, false).centre();
+        const double depth = eye.z - box.center().z;
+        if (wide) eye.y += off.y * depth;
+        else eye.x += off.x * depth;
     }
-    return w;
+    return {eye, tangent};
 }
 
 /// Narrows the angle until the targets span enough, and moves the eye sideways so that they
