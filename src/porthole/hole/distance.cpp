@@ -152,9 +152,10 @@ std::vector<std::int64_t> squared_distances(const Mask& sites, std::span<const V
     std::vector<std::int32_t> order(queries.size());
     std::iota(order.begin(), order.end(), 0);
     const auto query = [&](std::int32_t i) { return queries[std::size_t(i)]; };
-    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
+    const auto before = [&](std::int32_t a, std::int32_t b) {
         return query(a).y != query(b).y ? query(a).y < query(b).y : query(a).x < query(b).x;
-    });
+    };
+    if (!std::is_sorted(order.begin(), order.end(), before)) std::sort(order.begin(), order.end(), before);
     const Image<std::int32_t> columns = column_distances(sites, query(order.front()).y, query(order.back()).y + 1);
 
     Envelope envelope(w.width(), 1);

@@ -30,80 +30,115 @@ private:
     Image<std::int32_t> next_;
 };
 
-/// Sums over every run of 2 radius + 1 entries: out[i] = in[i - radius] + ... + in[i + radius].
-///
-/// Running sums would carry the rounding of everything left of a pixel along. Instead the line
-/// is cut into blocks as long as a run, at absolute positions; a run is the end of one block
-/// and the start of the next, summed from the cut outwards (van Herk, 1992). Rows of `lanes`
-/// entries are summed side by side.
-class RunSums {
-public:
-    /// @param origin absolute position of line 0.
-    RunSums(std::int32_t lines, std::int32_t origin, int radius, std::size_t lanes)
-        : lines_(lines), origin_(origin), radius_(radius), length_(2 * radius + 1), lanes_(lanes),
-          ends_(std::size_t(length_) * lanes), start_(lanes) {}
+/// Where runs of 2 radius + 1 pixels are cut. Running sums would carry the rounding of all that
+/// lies before a run along. Instead the line is cut into blocks as long as a run, at absolute
+/// positions; a run is the end of one block and the start of the next, each summed from the
+/// cut outwards (van Herk, 1992), so that its sum depends on its own entries only.
+struct Runs {
+    explicit Runs(int r) : radius(r), length(2 * r + 1) {}
+    int radius;
+    std::int32_t length;
+    /// Place of absolute position p within its block.
+    [[nodiscard]] std::int32_t place(std::int32_t p) const {
+        const std::int32_t r = p % length;
+        return r < 0 ? r + length : r;
+    }
+};
 
-    /// read(i) gives the lanes of line i in [0, lines); write(i, ends, start) is called for each
-    /// line in turn, whose sums are ends[lane] + start[lane].
-    template <typename Read, typename Write> void run(const Read& read, const Write& write) {
-        const auto add = [&](double* sum, std::int32_t line) {
-            if (line < 0 || line >= lines_) return;
-            const double* in = read(line);
-            for (std::size_t k = 0; k < lanes_; ++k) sum[k] += in[k];
-        };
-        const std::int32_t past = (origin_ - radius_) % length_;
-        const std::int32_t first_block = -radius_ - (past < 0 ? past + length_ : past);
-        for (std::int32_t block = first_block; block < lines_ - radius_; block += length_) {
-            std::fill(ends_.begin(), ends_.end(), 0.0);
-            for (std::int32_t o = length_ - 1; o >= 0; --o) {
-                double* sum = ends_.data() + std::size_t(o) * lanes_;
-                if (o + 1 < length_) std::copy(sum + lanes_, sum + 2 * lanes_, sum);
-                add(sum, block + o);
-            }
-            std::fill(start_.begin(), start_.end(), 0.0);
-            for (std::int32_t o = 0; o < length_; ++o) {
-                if (o > 0) add(start_.data(), block + length_ + o - 1);
-                const std::int32_t line = block + o + radius_;
-                if (line >= 0 && line < lines_) write(line, ends_.data() + std::size_t(o) * lanes_, start_.data());
-            }
+/// out[i] = sum of in[i - radius] .. in[i + radius], i in [0, n), where `used`; zero beyond.
+class RowSums {
+public:
+    RowSums(Runs runs, std::int32_t n, std::int32_t origin)
+        : runs_(runs), n_(n), origin_(origin), in_(padded(), 0.0), ends_(padded()), starts_(padded()) {}
+
+    void sum(const float* in, const std::uint8_t* used, double* out) {
+        double* middle = in_.data() + runs_.radius;
+        for (std::int32_t i = 0; i < n_; ++i) middle[i] = used[i] ? double(in[i]) : 0.0;
+
+        const std::int32_t first = origin_ - runs_.radius; // absolute position of in_[0]
+        std::int32_t place = runs_.place(first);
+        double sum = 0;
+        for (std::size_t i = 0; i < in_.size(); ++i) {
+            sum = place == 0 ? in_[i] : sum + in_[i];
+            starts_[i] = sum;
+            place = place + 1 == runs_.length ? 0 : place + 1;
+        }
+        sum = 0;
+        for (std::size_t i = in_.size(); i-- > 0;) {
+            place = place == 0 ? runs_.length - 1 : place - 1;
+            sum = place + 1 == runs_.length ? in_[i] : sum + in_[i];
+            ends_[i] = sum;
+        }
+        for (std::int32_t i = 0; i < n_; ++i) {
+            out[i] =
+                place == 0 ? ends_[std::size_t(i)] : ends_[std::size_t(i)] + starts_[std::size_t(i + 2 * runs_.radius)];
+            place = place + 1 == runs_.length ? 0 : place + 1;
         }
     }
 
 private:
-    std::int32_t lines_, origin_;
-    int radius_;
-    std::int32_t length_;
-    std::size_t lanes_;
-    std::vector<double> ends_, start_;
+    [[nodiscard]] std::size_t padded() const { return std::size_t(n_ + 2 * runs_.radius); }
+    Runs runs_;
+    std::int32_t n_, origin_;
+    std::vector<double> in_, ends_, starts_;
 };
 
-/// Sums of `values` over squares of 2 radius + 1 pixels, zero beyond the window.
-Image<double> square_sums(Image<double> values, int radius) {
-    const Rect w = values.window();
-    constexpr std::int32_t kLanes = 8;
-    // Across: eight rows at a time, side by side.
-    RunSums across(w.width(), w.x0, radius, kLanes);
-    std::vector<double> turned(std::size_t(w.width()) * kLanes);
-    for (std::int32_t y = w.y0; y < w.y1; y += kLanes) {
-        const std::int32_t rows = std::min(kLanes, w.y1 - y);
-        for (std::int32_t k = 0; k < kLanes; ++k) {
-            const double* in = values.row(y + std::min(k, rows - 1));
-            for (std::int32_t x = 0; x < w.width(); ++x) turned[std::size_t(x) * kLanes + std::size_t(k)] = in[x];
+/// Sums of lines of `width` entries over runs of lines, side by side. read(i) gives line i in
+/// [0, lines); write(i, ends, starts) is called for each i in turn, whose sums are
+/// ends[x] + starts[x]. No line up to i + radius is first read after that.
+template <typename Read, typename Write> void sum_lines(Runs runs, std::int32_t lines, std::int32_t origin,
+                                                        std::size_t width, const Read& read, const Write& write) {
+    std::vector<double> ends(std::size_t(runs.length) * width), starts(width);
+    const auto add = [&](double* sum, std::int32_t line) {
+        if (line < 0 || line >= lines) return;
+        const double* in = read(line);
+        for (std::size_t x = 0; x < width; ++x) sum[x] += in[x];
+    };
+    for (std::int32_t block = -runs.radius - runs.place(origin - runs.radius); block < lines - runs.radius;
+         block += runs.length) {
+        std::fill(ends.begin(), ends.end(), 0.0);
+        for (std::int32_t o = runs.length - 1; o >= 0; --o) {
+            double* sum = ends.data() + std::size_t(o) * width;
+            if (o + 1 < runs.length) std::copy(sum + width, sum + 2 * width, sum);
+            add(sum, block + o);
         }
-        across.run([&](std::int32_t x) { return turned.data() + std::size_t(x) * kLanes; },
-                   [&](std::int32_t x, const double* ends, const double* start) {
-                       for (std::int32_t k = 0; k < rows; ++k) values.row(y + k)[x] = ends[k] + start[k];
-                   });
+        std::fill(starts.begin(), starts.end(), 0.0);
+        for (std::int32_t o = 0; o < runs.length; ++o) {
+            if (o > 0) add(starts.data(), block + runs.length + o - 1);
+            const std::int32_t line = block + o + runs.radius;
+            if (line >= 0 && line < lines) write(line, ends.data() + std::size_t(o) * width, starts.data());
+        }
     }
-    // Down: whole rows side by side.
-    Image<double> result(w);
-    RunSums down(w.height(), w.y0, radius, std::size_t(w.width()));
-    down.run([&](std::int32_t y) { return values.row(w.y0 + y); },
-             [&](std::int32_t y, const double* ends, const double* start) {
-                 double* out = result.row(w.y0 + y);
-                 for (std::int32_t x = 0; x < w.width(); ++x) out[x] = ends[x] + start[x];
-             });
-    return result;
+}
+
+/// How many pixels of `mask` lie in the square of 2 radius + 1 pixels around each pixel of `box`.
+Image<std::int32_t> square_counts(const Mask& mask, Rect box, int radius) {
+    const Rect read = box.grown(radius).intersected(mask.window());
+    const auto width = std::size_t(box.width());
+    Image<std::int32_t> counts(box);
+    std::vector<std::int32_t> column(std::size_t(read.width())); // over the rows of the square
+    const auto add_row = [&](std::int32_t y, std::int32_t sign) {
+        if (y < read.y0 || y >= read.y1) return;
+        const std::uint8_t* row = mask.row(y) + (read.x0 - mask.window().x0);
+        for (std::size_t x = 0; x < column.size(); ++x) column[x] += sign * row[x];
+    };
+    for (std::int32_t y = box.y0 - radius; y < box.y0 + radius; ++y) add_row(y, 1);
+    for (std::int32_t y = box.y0; y < box.y1; ++y) {
+        add_row(y + radius, 1);
+        add_row(y - radius - 1, -1);
+        const auto at = [&](std::int32_t x) {
+            return x < read.x0 || x >= read.x1 ? 0 : column[std::size_t(x - read.x0)];
+        };
+        std::int32_t sum = 0;
+        for (std::int32_t x = box.x0 - radius; x < box.x0 + radius; ++x) sum += at(x);
+        std::int32_t* out = counts.row(y);
+        for (std::size_t i = 0; i < width; ++i) {
+            const std::int32_t x = box.x0 + std::int32_t(i);
+            sum += at(x + radius) - at(x - radius - 1);
+            out[i] = sum;
+        }
+    }
+    return counts;
 }
 
 } // namespace
@@ -113,21 +148,24 @@ Image<float> paint_floor(Image<float> depth, const Image<PartId>& targets, std::
     // Deepest first, so that the first disc to reach a pixel is the one that counts.
     std::sort(discs.begin(), discs.end(), [](const FloorDisc& a, const FloorDisc& b) { return a.depth > b.depth; });
     Unpainted unpainted(box);
+    const auto paint_row = [&](const FloorDisc& disc, std::int32_t y, std::int32_t half) {
+        if (y < box.y0 || y >= box.y1) return;
+        const std::int32_t x1 = std::min(disc.center.x + half + 1, box.x1);
+        float* row = depth.row(y) - depth.window().x0;
+        const PartId* target = targets.row(y) - targets.window().x0;
+        for (std::int32_t x = std::max(disc.center.x - half, box.x0); (x = unpainted.next(x, y)) < x1;) {
+            if (target[x] == kNoPart) row[x] = disc.depth;
+            unpainted.paint(x, y);
+        }
+    };
     for (const FloorDisc& disc : discs) {
         const std::int64_t radius2 = disc.weight / scale;
-        const auto radius = std::int32_t(integer_sqrt(radius2));
-        const std::int32_t y0 = std::max(disc.center.y - radius, box.y0),
-                           y1 = std::min(disc.center.y + radius + 1, box.y1);
-        for (std::int32_t y = y0; y < y1; ++y) {
-            const std::int64_t dy = y - disc.center.y;
-            const auto half = std::int32_t(integer_sqrt(radius2 - dy * dy));
-            const std::int32_t x1 = std::min(disc.center.x + half + 1, box.x1);
-            float* row = depth.row(y) - depth.window().x0;
-            const PartId* target = targets.row(y) - targets.window().x0;
-            for (std::int32_t x = std::max(disc.center.x - half, box.x0); (x = unpainted.next(x, y)) < x1;) {
-                if (target[x] == kNoPart) row[x] = disc.depth;
-                unpainted.paint(x, y);
-            }
+        // The disc's rows from its centre outwards; they only get narrower.
+        std::int64_t half = integer_sqrt(radius2);
+        for (std::int32_t dy = 0; std::int64_t(dy) * dy <= radius2; ++dy) {
+            while (half * half > radius2 - std::int64_t(dy) * dy) --half;
+            paint_row(disc, disc.center.y + dy, std::int32_t(half));
+            if (dy > 0) paint_row(disc, disc.center.y - dy, std::int32_t(half));
         }
     }
     return depth;
@@ -136,21 +174,36 @@ Image<float> paint_floor(Image<float> depth, const Image<PartId>& targets, std::
 Image<float> blur_floor(Image<float> depth, const Mask& mask, const Image<PartId>& targets, Rect box, int radius,
                         int times) {
     if (radius == 0 || box.empty()) return depth;
-    const Rect read = box.grown(radius).intersected(depth.window());
-    const auto for_each_pixel = [](Rect r, const auto& f) {
-        for (std::int32_t y = r.y0; y < r.y1; ++y)
-            for (std::int32_t x = r.x0; x < r.x1; ++x) f(x, y);
-    };
-    Image<double> values(read);
-    for_each_pixel(read, [&](std::int32_t x, std::int32_t y) { values(x, y) = mask(x, y) ? 1.0 : 0.0; });
-    const Image<double> counts = square_sums(values, radius);
+    const Image<std::int32_t> counts = square_counts(mask, box, radius);
+    const Rect w = depth.window(), read = box.grown(radius).intersected(w);
+    const Runs runs(radius);
+    const auto width = std::size_t(read.width());
+    RowSums row_sums(runs, read.width(), read.x0);
+    // Sums along the rows of two blocks: every row is read before it is written, once.
+    const std::int32_t kept = 2 * runs.length;
+    std::vector<double> across(std::size_t(kept) * width);
     for (; times > 0; --times) {
-        for_each_pixel(read,
-                       [&](std::int32_t x, std::int32_t y) { values(x, y) = mask(x, y) ? double(depth(x, y)) : 0.0; });
-        const Image<double> sums = square_sums(values, radius);
-        for_each_pixel(box, [&](std::int32_t x, std::int32_t y) {
-            if (mask(x, y) && targets(x, y) == kNoPart) depth(x, y) = float(sums(x, y) / counts(x, y));
-        });
+        std::int32_t ready = 0;
+        const auto row = [&](std::int32_t line) { return across.data() + std::size_t(line % kept) * width; };
+        const auto read_line = [&](std::int32_t line) {
+            for (; ready <= line; ++ready) {
+                const std::int32_t y = read.y0 + ready;
+                row_sums.sum(depth.row(y) + (read.x0 - w.x0), mask.row(y) + (read.x0 - w.x0), row(ready));
+            }
+            return row(line);
+        };
+        const auto write_line = [&](std::int32_t line, const double* ends, const double* starts) {
+            const std::int32_t y = read.y0 + line;
+            if (y < box.y0 || y >= box.y1) return;
+            float* out = depth.row(y) - w.x0;
+            const std::uint8_t* inside = mask.row(y) - w.x0;
+            const PartId* target = targets.row(y) - w.x0;
+            const std::int32_t* count = counts.row(y) - box.x0;
+            for (std::int32_t x = box.x0; x < box.x1; ++x)
+                if (inside[x] && target[x] == kNoPart)
+                    out[x] = float((ends[x - read.x0] + starts[x - read.x0]) / count[x]);
+        };
+        sum_lines(runs, read.height(), read.y0, width, read_line, write_line);
     }
     return depth;
 }

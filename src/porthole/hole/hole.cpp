@@ -199,10 +199,9 @@ Hole grow_hole(std::span<const Contour> contours, const IdBuffer& targets, const
     const Rect box = bounds_of(pixels).grown(params.depth_px + int(kRimReach) + 1).intersected(hole.window);
     draw_discs(hole, targets.id, sites, pixels.empty() ? Rect{} : box, params.depth_px);
 
-    // The floor: targets' own depths, and over the band what its discs bring along.
+    // The floor: the targets' own depths (+infinity elsewhere), and over the band what its
+    // discs bring along.
     Image<float> floor = targets.depth;
-    for (std::size_t i = 0; i < floor.pixels().size(); ++i)
-        if (targets.id.pixels()[i] == kNoPart) floor.pixels()[i] = kInfinity;
     if (!discs.empty()) {
         floor = paint_floor(std::move(floor), targets.id, std::move(discs), kScale, box);
         floor = blur_floor(std::move(floor), hole.mask, targets.id, box, int(std::lround(params.blur_px)), 2);

@@ -224,6 +224,21 @@ TEST(GrowHole, CropWithItsMarginEqualsTheFullPicture) {
     }
 }
 
+TEST(GrowHole, ClearanceCountsFourDepthsAway) {
+    // The picture begins at x = 0. A contour pixel one depth to the left of it, with its nearest
+    // outside pixel 17 further left, has r = 17/3 < 6: its disc ends short of the picture. A
+    // window of three depths and a pixel around the picture does not show that outside pixel.
+    const auto grow = [](std::int32_t margin) {
+        const Rect window = Rect{0, 0, 20, 1}.grown(margin).intersected({-24, 0, 20, 1});
+        const Mask target = mask_where(window, [](int x, int) { return x <= -6; });
+        const Mask enclosing = mask_where(window, [](int x, int) { return x != -23; });
+        return Case{id_buffer(target), target, enclosing, {.depth_px = 6, .blur_px = 0}}.grow();
+    };
+    EXPECT_EQ(hole_margin_px({.depth_px = 6, .blur_px = 0}), 30);
+    EXPECT_FALSE(grow(30).mask(0, 0));
+    EXPECT_TRUE(grow(3 * 6 + 1).mask(0, 0));
+}
+
 /// A target disc of radius r around (cx, cy) in an enclosing disc of radius R around (0, 0).
 Case discs(double big_radius, double cx, double radius, int depth_px) {
     const auto size = std::int32_t(big_radius) + 6;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <iterator>
+#include <cstring>
 #include <span>
 
 #include "porthole/base/image.h"
@@ -14,12 +14,15 @@ inline Rect bounds_of(const Mask& mask) {
     const Rect w = mask.window();
     Rect r{w.x1, w.y1, w.x0, w.y0};
     for (std::int32_t y = w.y0; y < w.y1; ++y) {
-        const std::uint8_t *row = mask.row(y), *end = row + w.width();
-        const std::uint8_t* first = std::find(row, end, 1);
-        if (first == end) continue;
-        const auto last = std::find(std::reverse_iterator(end), std::reverse_iterator(first), 1).base();
-        r = {std::min(r.x0, w.x0 + std::int32_t(first - row)), std::min(r.y0, y),
-             std::max(r.x1, w.x0 + std::int32_t(last - row)), y + 1};
+        const std::uint8_t* row = mask.row(y) - w.x0;
+        const void* first = std::memchr(row + w.x0, 1, std::size_t(w.width()));
+        if (!first) continue;
+        r.x0 = std::min(r.x0, std::int32_t(static_cast<const std::uint8_t*>(first) - row));
+        std::int32_t end = w.x1; // only beyond what is known can there be something new
+        while (end > r.x1 && row[end - 1] != 1) --end;
+        r.x1 = std::max(r.x1, end);
+        r.y0 = std::min(r.y0, y);
+        r.y1 = y + 1;
     }
     return r.empty() ? Rect{} : r;
 }
