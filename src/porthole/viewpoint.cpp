@@ -53,12 +53,22 @@ double ViewScore::value(std::int64_t largest_area) const {
     if (target_pixels == 0 || largest_area == 0) return 0;
     const double v2 = visible * visible;
     return v2 * v2 * std::sqrt(double(target_pixels) / double(largest_area)) * (0.1 + ring) *
-           std::sqrt(std::max(0.0, 1 - context_removed)) * (0.5 + 0.5 * entropy) * (above ? 1.0 : 0.5);
+           std::sqrt(std::max(0.0, 1 - context_removed)) * (0.5 + 0.5 * entropy) * pose;
+}
+
+double pose_of(Vec3f toward_eye) {
+    const double elevation = std::asin(std::clamp(double(toward_eye.y), -1.0, 1.0)) * 180 / double(kPi);
+    double liked = 1;
+    if (elevation < -1e-3) liked = 0.5;
+    else if (elevation < 5) liked = 0.75 + 0.05 * elevation;
+    else if (elevation > 50) liked = 1 - 0.75 * (elevation - 50) / 40;
+    const double along_axis = std::max({std::abs(toward_eye.x), std::abs(toward_eye.y), std::abs(toward_eye.z)});
+    return liked * (0.7 + 0.3 * std::clamp((1 - along_axis) / 0.15, 0.0, 1.0));
 }
 
 ViewScore score_view(const Subject& subject, const ViewPlan& plan, const IdBuffer& ids) {
     ViewScore score;
-    score.above = plan.view.forward().y <= 1e-6f;
+    score.pose = pose_of(-plan.view.forward());
     const IdBuffer after = opened_ids(plan, ids);
 
     double visible = 0;
