@@ -62,6 +62,7 @@ double pose_of(Vec3f toward_eye) {
     if (elevation < -1e-3) liked = 0.5;
     else if (elevation < 5) liked = 0.75 + 0.05 * elevation;
     else if (elevation > 50) liked = 1 - 0.75 * (elevation - 50) / 40;
+    if (toward_eye.z < -1e-3f) liked *= 0.85;
     const double along_axis = std::max({std::abs(toward_eye.x), std::abs(toward_eye.y), std::abs(toward_eye.z)});
     return liked * (0.7 + 0.3 * std::clamp((1 - along_axis) / 0.15, 0.0, 1.0));
 }

@@ -24,7 +24,7 @@ struct ViewScore {
 
 /// How one likes to look at a thing from `toward_eye` (unit length): 1 from 5 to 50 degrees
 /// above the horizon, 0.75 at the horizon, 0.5 below it, down to 0.25 straight from above; times
-/// 0.7 along an axis of the model, rising to 1 for three-quarter views, which show three sides.
+/// 0.85 from behind, and times 0.7 along an axis of the model, rising to 1 for three-quarter views, which show three sides.
 [[nodiscard]] double pose_of(Vec3f toward_eye);
 
 /// @param ids  plain id buffer of the same view.
