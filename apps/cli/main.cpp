@@ -1,5 +1,5 @@
 // The command line: its flags, and what becomes of errors and interrupts.
-#include <csignal>
+#include <algorithm>
 #include <cstdio>
 #include <iterator>
 #include <new>
@@ -48,10 +48,15 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, Enum& value, con
     });
 }
 
+void add_model(CLI::App& app, CommonOptions& o) {
+    app.add_option("MODEL", o.model, "The model: glTF, GLB, OBJ, PLY or STL; - reads standard input")
+        ->type_name("FILE")
+        ->required();
+}
+
 void add_common(CLI::App& app, CommonOptions& o) {
-    app.add_option("MODEL", o.model, "The model: glTF, GLB, OBJ, PLY or STL; - reads standard input")->required();
-    CLI::Option_group* const reading = app.add_option_group("Reading");
-    add_read(*reading, "--format", "Format of the model, whatever its name", "glb|gltf|obj|ply|stl",
+    app.option_defaults()->group("Reading");
+    add_read(app, "--format", "Format of the model, whatever its name", "glb|gltf|obj|ply|stl",
              [&o](const std::string& text, const std::string& option) {
                  for (const char* known : {"glb", "gltf", "obj", "ply", "stl"})
                      if (text == known) {
@@ -61,97 +66,98 @@ void add_common(CLI::App& app, CommonOptions& o) {
                  throw Error(ErrorKind::usage, "E0105", option,
                              "\"" + text.substr(0, 80) + "\" is not one of glb, gltf, obj, ply, stl");
              });
-    add_read(*reading, "--up", "Axis of the file that points up (default y)", "y|z",
+    add_read(app, "--up", "Axis of the file that points up (default y)", "y|z",
              [&o](const std::string& text, const std::string& option) { o.load.up = parse_up(text, option); });
-    add_read(*reading, "--units", "Length unit of the file: m, cm, mm, um, km, in, ft or metres", "UNIT",
+    add_read(app, "--units", "Length unit of the file: m, cm, mm, um, km, in, ft or metres", "UNIT",
              [&o](const std::string& text, const std::string& option) { o.load.metres_per_unit = parse_units(text, option); });
-    reading->add_option("--time", o.load.time, "Seconds into the first animation (default: rest pose)")
+    app.add_option("--time", o.load.time, "Seconds into the first animation (default: rest pose)")
         ->type_name("SECONDS")
         ->check(CLI::Range(0.0, 1e6));
-    CLI::Option_group* const running = app.add_option_group("Running");
-    running->add_option("--threads", o.threads, "Threads (default: one per processor)")->type_name("N")->check(CLI::Range(1, 1024));
-    add_read(*running, "--max-memory", "Most memory to take, such as 4G; exit 5 beyond it", "BYTES",
+    app.option_defaults()->group("Running");
+    app.add_option("--threads", o.threads, "Threads (default: one per processor)")->type_name("N")->check(CLI::Range(1, 1024));
+    add_read(app, "--max-memory", "Most memory to take, such as 4G; exit 5 beyond it", "BYTES",
              [&o](const std::string& text, const std::string& option) { o.max_memory = parse_bytes(text, option); });
-    running->add_flag("--quiet", o.quiet, "Say nothing but warnings and errors");
-    running->add_flag("--verbose", o.verbose, "Say more");
-    add_choice<std::string>(*running, "--log", o.log, {{"text", "text"}, {"json", "json"}}, "How messages are written to standard error");
+    app.add_flag("--quiet", o.quiet, "Say nothing but warnings and errors");
+    app.add_flag("--verbose", o.verbose, "Say more");
+    add_choice<std::string>(app, "--log", o.log, {{"text", "text"}, {"json", "json"}}, "How messages are written to standard error");
 }
 
 void add_camera(CLI::App& app, CameraParams& c) {
-    CLI::Option_group* const group = app.add_option_group("Camera");
-    group->add_option("--camera", c.name,
+    app.option_defaults()->group("Camera");
+    app.add_option("--camera", c.name,
                       "auto, front, back, left, right, top, bottom, iso, or a camera of the file by name or #N "
                       "(default auto)")
         ->type_name("VIEW");
     const auto add_vector = [&](const char* name, std::optional<Vec3d>& v, const char* help) {
-        add_read(*group, name, help, "X,Y,Z",
+        add_read(app, name, help, "X,Y,Z",
                  [&v](const std::string& text, const std::string& option) { v = parse_vector(text, option); });
     };
     add_vector("--camera-position", c.position, "Where the eye is, metres; no framing then");
     add_vector("--camera-focal-point", c.focal_point, "What it looks at (default: the model's centre)");
     add_vector("--camera-view-up", c.view_up, "What points up in the picture (default 0,1,0)");
     add_vector("--camera-direction", c.direction, "The way it looks");
-    group->add_option("--camera-azimuth-angle", c.azimuth_deg, "Carries the eye round to the right")->type_name("DEGREES");
-    group->add_option("--camera-elevation-angle", c.elevation_deg, "Carries the eye up")->type_name("DEGREES");
-    group->add_option("--camera-zoom-factor", c.zoom, "2 shows things twice as large")->type_name("FACTOR");
-    group->add_option("--camera-view-angle", c.view_angle_deg, "Vertical angle of view (default 30)")->type_name("DEGREES");
-    group->add_flag("--camera-orthographic", c.orthographic, "Parallel projection");
-    add_choice<Framing>(*group, "--frame", c.frame, {{"auto", Framing::automatic}, {"all", Framing::all}},
+    app.add_option("--camera-azimuth-angle", c.azimuth_deg, "Carries the eye round to the right")->type_name("DEGREES");
+    app.add_option("--camera-elevation-angle", c.elevation_deg, "Carries the eye up")->type_name("DEGREES");
+    app.add_option("--camera-zoom-factor", c.zoom, "2 shows things twice as large")->type_name("FACTOR");
+    app.add_option("--camera-view-angle", c.view_angle_deg, "Vertical angle of view (default 30)")->type_name("DEGREES");
+    app.add_flag("--camera-orthographic", c.orthographic, "Parallel projection");
+    add_choice<Framing>(app, "--frame", c.frame, {{"auto", Framing::automatic}, {"all", Framing::all}},
                         "auto: closer until targets span 15 % of the height; all: the whole model (default auto)");
 }
 
 void add_picture(CLI::App& app, PictureOptions& o) {
-    CLI::Option_group* const files = app.add_option_group("Output");
-    files->add_option("-o,--output", o.output, "Picture: .png, .jpg, .jpeg, or - for a PNG on standard output (default out.png)")
+    app.option_defaults()->group("Output");
+    app.add_option("-o,--output", o.output, "Picture: .png, .jpg, .jpeg, or - for a PNG on standard output (default out.png)")
         ->type_name("FILE");
-    files->add_option("--report", o.report_path, "Write what was done as JSON")->type_name("FILE");
-    files->add_flag("--json", o.json, "The report on standard output; no picture unless -o is given");
-    add_read(*files, "--size,--resolution", "Width and height in pixels (default 1920x1080)", "WxH",
+    app.add_option("--report", o.report_path, "Write what was done as JSON")->type_name("FILE");
+    app.add_flag("--json", o.json, "The report on standard output; no picture unless -o is given");
+    add_read(app, "--size,--resolution", "Width and height in pixels (default 1920x1080)", "WxH",
              [&o](const std::string& text, const std::string& option) { o.size = parse_size(text, option); });
-    files->add_option("--bits", o.bits, "Bits per channel of a PNG (default 8)")->type_name("8|16")->check(CLI::IsMember({8, 16}));
-    files->add_flag("--no-clobber", o.no_clobber, "Leave existing files alone: exit 4 instead");
-    CLI::Option_group* const look = app.add_option_group("Look");
-    add_read(*look, "--background", "#rrggbb, white or black (default white)", "COLOR",
+    app.add_option("--bits", o.bits, "Bits per channel of a PNG (default 8)")->type_name("N")->check(CLI::IsMember({8, 16}));
+    app.add_flag("--no-clobber", o.no_clobber, "Leave existing files alone: exit 4 instead");
+    app.option_defaults()->group("Look");
+    add_read(app, "--background", "#rrggbb, white or black (default white)", "COLOR",
              [&o](const std::string& text, const std::string& option) { o.render.background = parse_color(text, option); });
-    look->add_flag("--no-background", o.no_background, "Transparent where there is no model");
-    look->add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 8)")
+    app.add_flag("--no-background", o.no_background, "Transparent where there is no model");
+    app.add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 8)")
         ->type_name("N")
         ->check(CLI::Range(1, 4096));
-    look->add_option("--ao-samples", o.render.ao_samples, "Ambient occlusion rays per pixel (default 4, 0: none)")
+    app.add_option("--ao-samples", o.render.ao_samples, "Ambient occlusion rays per pixel (default 4, 0: none)")
         ->type_name("N")
         ->check(CLI::Range(0, 256));
-    look->add_flag_callback("--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
-    add_choice<std::string>(*look, "--isa", o.isa, {{"avx2", "avx2"}, {"native", "native"}},
+    app.add_flag_callback("--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
+    add_choice<std::string>(app, "--isa", o.isa, {{"avx2", "avx2"}, {"native", "native"}},
                             "avx2: the same pixels on every machine; native: the fastest");
     add_camera(app, o.camera);
 }
 
 void add_reveal(CLI::App& app, RevealOptions& o) {
-    add_common(app, o.common);
-    CLI::Option_group* const who = app.add_option_group("Who is seen, who is cut");
-    add_list(*who, "--target", o.target, "Parts that must be seen; may be given several times")->required();
-    add_list(*who, "--keep", o.keep, "Parts that stay whole; may be given several times");
-    add_list(*who, "--cut-only", o.cut_only, "Cut no parts but these; may be given several times");
-    add_choice<bool>(*who, "--see-through", o.keep_see_through, {{"cut", false}, {"keep", true}},
+    add_model(app, o.common);
+    app.option_defaults()->group("Who is seen, who is cut");
+    add_list(app, "--target", o.target, "Parts that must be seen; may be given several times")->required();
+    add_list(app, "--keep", o.keep, "Parts that stay whole; may be given several times");
+    add_list(app, "--cut-only", o.cut_only, "Cut no parts but these; may be given several times");
+    add_choice<bool>(app, "--see-through", o.keep_see_through, {{"cut", false}, {"keep", true}},
                      "Glass and other see-through parts: cut or kept whole (default cut)");
-    CLI::Option_group* const hole = app.add_option_group("Hole");
-    add_read(*hole, "--depth", "Width of the band that the hole adds around targets (default 5% of the picture's height)",
+    app.option_defaults()->group("Hole");
+    add_read(app, "--depth", "Width of the band that the hole adds around targets (default 5% of the picture's height)",
              "N[px|%|mm]",
              [&o](const std::string& text, const std::string& option) { o.plan.depth = parse_length(text, option); });
-    add_choice<HoleStyle>(*hole, "--style", o.plan.style, {{"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
+    add_choice<HoleStyle>(app, "--style", o.plan.style, {{"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
                           "hole: straight walls; paper: as the paper builds it (default hole)");
-    add_choice<ContourMethod>(*hole, "--contours", o.plan.contours,
+    add_choice<ContourMethod>(app, "--contours", o.plan.contours,
                               {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},
                               "How targets' outlines are found (default exact)");
-    add_choice<Tight>(*hole, "--tight", o.plan.tight, {{"refuse", Tight::refuse}, {"open", Tight::open}},
+    add_choice<Tight>(app, "--tight", o.plan.tight, {{"refuse", Tight::refuse}, {"open", Tight::open}},
                       "Targets without room for a band: refused, or opened all the same (default refuse)");
-    hole->add_flag("--strict", o.strict, "Exit 8 if some target is refused or absent, not only if all are");
-    hole->add_option("--debug-dir", o.debug_dir, "Write every value of the plan as a picture")->type_name("DIR");
+    app.add_flag("--strict", o.strict, "Exit 8 if some target is refused or absent, not only if all are");
+    app.add_option("--debug-dir", o.debug_dir, "Write every value of the plan as a picture")->type_name("DIR");
     add_picture(app, o.picture);
+    app.option_defaults()->group("Look");
     add_choice<Emphasis>(app, "--emphasis", o.picture.render.emphasis,
                          {{"accent", Emphasis::accent}, {"saturate", Emphasis::saturate}, {"none", Emphasis::none}},
-                         "How targets stand out (default accent)")
-        ->group("Look");
+                         "How targets stand out (default accent)");
+    add_common(app, o.common);
     app.footer("Selectors: a name, a path, a glob with * and **, re:EXPRESSION, #ID, mat:MATERIAL, name:NAME.\n\n"
                "Examples:\n"
                "  porthole reveal engine.glb --target 'rod*' -o rods.png --report rods.json\n"
@@ -160,17 +166,19 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
 }
 
 void add_render(CLI::App& app, RenderOptions& o) {
-    add_common(app, o.common);
+    add_model(app, o.common);
     add_list(app, "--focus", o.focus, "Frame the picture on these parts, as reveal does on its targets")->group("Camera");
     add_picture(app, o.picture);
+    add_common(app, o.common);
     app.footer("Examples:\n"
                "  porthole render engine.glb -o engine.png\n"
                "  porthole render part.stl --units mm --up z --camera front --size 800x600 -o part.jpg");
 }
 
 void add_parts(CLI::App& app, PartsOptions& o) {
-    add_common(app, o.common);
+    add_model(app, o.common);
     app.add_flag("--json", o.json, "As JSON, with materials, positions and counts of edges")->group("Output");
+    add_common(app, o.common);
     app.footer("Examples:\n"
                "  porthole parts engine.glb\n"
                "  porthole parts engine.glb --json | jq -r '.parts[] | select(.closed | not) | .path'");
@@ -216,20 +224,24 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& e) {
     const auto called = app.get_subcommands();
     const std::string command = called.empty() ? "porthole" : "porthole " + called.front()->get_name();
     std::string reason = e.what();
-    for (char& c : reason)
-        if (c == '\n') c = ' ';
-    if (dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr || dynamic_cast<const CLI::ArgumentMismatch*>(&e) != nullptr) {
-        std::vector<std::string> known, unknown = app.remaining(true);
+    std::replace(reason.begin(), reason.end(), '\n', ' ');
+    const std::vector<std::string> unknown = app.remaining(true);
+    const bool extra = dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr;
+    if (!unknown.empty() && (extra || dynamic_cast<const CLI::RequiredError*>(&e) != nullptr)) {
+        // An unknown option is named rather than the value after it, whatever their order.
+        const auto option = std::find_if(unknown.begin(), unknown.end(), [](const std::string& u) { return u.starts_with('-'); });
+        const std::string& word = option == unknown.end() ? unknown.front() : *option;
+        std::vector<std::string> known;
         for (const CLI::App* sub : called)
-            for (const CLI::Option* option : sub->get_options())
-                for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+            for (const CLI::Option* o : sub->get_options())
+                for (const std::string& name : o->get_lnames()) known.push_back("--" + name);
         if (called.empty())
             for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) known.push_back(sub->get_name());
-        if (!unknown.empty()) {
-            const std::vector<std::string> near = nearest_names(unknown.front(), known, 2);
-            for (std::size_t i = 0; i < near.size(); ++i) reason += (i ? " or " : "; did you mean ") + near[i];
-            if (!near.empty()) reason += '?';
-        }
+        reason = "\"" + word.substr(0, 80) + "\" is not known here";
+        const std::vector<std::string> near =
+            word.size() < 3 ? std::vector<std::string>{} : nearest_names(word.substr(0, word.find('=')), known, 2);
+        for (std::size_t i = 0; i < near.size(); ++i) reason += (i ? " or " : "; did you mean ") + near[i];
+        if (!near.empty()) reason += '?';
     }
     return {ErrorKind::usage, "E0101", command, reason + " (" + command + " --help)"};
 }

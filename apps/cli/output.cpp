@@ -41,6 +41,7 @@ void Output::configure(bool quiet, bool verbose, bool json_lines) {
 }
 
 void Output::message(std::string_view level, std::string_view code, std::string_view where, std::string_view reason) {
+    while (where.ends_with(':')) where.remove_suffix(1); // the file as a whole
     const std::string place = escaped(where, kShownBytes), why = escaped(reason, kShownBytes);
     if (json_) {
         write_stderr(json_line({{"level", level}, {"code", code}, {"where", place}, {"message", why}}));

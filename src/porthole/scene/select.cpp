@@ -270,7 +270,7 @@ std::vector<std::string> nearest_names(std::string_view wanted, std::span<const 
     std::ranges::copy_if(lowered(wanted), std::back_inserter(plain), [](char c) { return c != '*'; });
     plain.resize(std::min(plain.size(), kCompared));
     if (plain.empty()) return {};
-    const int limit = std::max(1, int(plain.size()) / 3);
+    const int limit = plain.size() <= 3 ? 1 : std::max(2, int(plain.size()) / 3);
 
     struct Candidate {
         int rank; ///< 0: equal but for case; 1: contains it; then the number of edits
