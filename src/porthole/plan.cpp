@@ -168,8 +168,8 @@ void keep_only(IdBuffer& ids, std::span<const PartId> kept) {
 }
 
 /// Everything of the plan that depends on which targets are opened.
-void plan_opened_group(const Subject& subject, const PlanParams& params, Rect whole, const BlockMask& blocks,
-                       ViewPlan& plan, const Control& control) {
+void plan_opened_group(const Subject& subject, const PlanParams& params, const HoleParams& band, Rect whole,
+                       const BlockMask& blocks, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const bool all = plan.opened.size() == subject.targets.size();
     std::optional<Bvh> some;
@@ -215,8 +215,7 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, Rect wh
         Mask covered(plan.window, 0);
         for (std::size_t i = 0; i < covered.pixels().size(); ++i)
             covered.pixels()[i] = plan.spans.nearest.pixels()[i] < kInfinity;
-        plan.hole = grow_hole(plan.contours, plan.target_ids, covered, plan.enclosing,
-                              {.depth_px = plan.depth_px, .blur_px = 0.025f * float(view.height)});
+        plan.hole = grow_hole(plan.contours, plan.target_ids, covered, plan.enclosing, band);
     }
     plan.cut = make_cut(subject, view, plan.hole, plan.target_ids, plan.cut_set, cut_bvh, params.style, control,
                         plan.rays.loose);
@@ -273,7 +272,8 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     ViewPlan plan;
     plan.view = view;
     plan.depth_px = band_depth_px(subject, view, params);
-    const int margin = 3 * plan.depth_px + 1;
+    const HoleParams band{.depth_px = plan.depth_px, .blur_px = 0.025f * float(view.height)};
+    const int margin = hole_margin_px(band);
     const Rect whole = view.window().grown(margin);
 
     // Each target alone, then all of them together.
@@ -289,7 +289,7 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     // A target that has no room is taken out of the group, and the rest is planned again:
     // what it covered may have become visible, what only it needed stays whole.
     for (;;) {
-        plan_opened_group(subject, params, whole, blocks, plan, control);
+        plan_opened_group(subject, params, band, whole, blocks, plan, control);
         if (params.tight == Tight::open || plan.cut_set.empty()) return plan;
         std::vector<PartId> refused = no_room(plan, params);
         if (refused.empty()) return plan;

@@ -3,32 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include "porthole/hole/distance.h"
 
 namespace porthole {
 namespace {
-
-/// Per row of a box, the next pixel to the right that is not painted yet: disjoint sets whose
-/// representative is that pixel (one past the row when there is none).
-class Unpainted {
-public:
-    explicit Unpainted(Rect box) : box_(box), next_(Rect{box.x0, box.y0, box.x1 + 1, box.y1}) {
-        for (std::int32_t y = box.y0; y < box.y1; ++y) {
-            std::int32_t* row = next_.row(y);
-            std::iota(row, row + box.width() + 1, box.x0);
-        }
-    }
-    [[nodiscard]] std::int32_t next(std::int32_t x, std::int32_t y) {
-        std::int32_t* row = next_.row(y) - box_.x0;
-        while (row[x] != x) x = row[x] = row[row[x]]; // path halving
-        return x;
-    }
-    void paint(std::int32_t x, std::int32_t y) { next_(x, y) = x + 1; }
-
-private:
-    Rect box_;
-    Image<std::int32_t> next_;
-};
 
 /// Where runs of 2 radius + 1 pixels are cut. Running sums would carry the rounding of all that
 /// lies before a run along. Instead the line is cut into blocks as long as a run, at absolute
@@ -142,34 +119,6 @@ Image<std::int32_t> square_counts(const Mask& mask, Rect box, int radius) {
 }
 
 } // namespace
-
-Image<float> paint_floor(Image<float> depth, const Image<PartId>& targets, std::vector<FloorDisc> discs,
-                         std::int64_t scale, Rect box) {
-    // Deepest first, so that the first disc to reach a pixel is the one that counts.
-    std::sort(discs.begin(), discs.end(), [](const FloorDisc& a, const FloorDisc& b) { return a.depth > b.depth; });
-    Unpainted unpainted(box);
-    const auto paint_row = [&](const FloorDisc& disc, std::int32_t y, std::int32_t half) {
-        if (y < box.y0 || y >= box.y1) return;
-        const std::int32_t x1 = std::min(disc.center.x + half + 1, box.x1);
-        float* row = depth.row(y) - depth.window().x0;
-        const PartId* target = targets.row(y) - targets.window().x0;
-        for (std::int32_t x = std::max(disc.center.x - half, box.x0); (x = unpainted.next(x, y)) < x1;) {
-            if (target[x] == kNoPart) row[x] = disc.depth;
-            unpainted.paint(x, y);
-        }
-    };
-    for (const FloorDisc& disc : discs) {
-        const std::int64_t radius2 = disc.weight / scale;
-        // The disc's rows from its centre outwards; they only get narrower.
-        std::int64_t half = integer_sqrt(radius2);
-        for (std::int32_t dy = 0; std::int64_t(dy) * dy <= radius2; ++dy) {
-            while (half * half > radius2 - std::int64_t(dy) * dy) --half;
-            paint_row(disc, disc.center.y + dy, std::int32_t(half));
-            if (dy > 0) paint_row(disc, disc.center.y - dy, std::int32_t(half));
-        }
-    }
-    return depth;
-}
 
 Image<float> blur_floor(Image<float> depth, const Mask& mask, const Image<PartId>& targets, Rect box, int radius,
                         int times) {

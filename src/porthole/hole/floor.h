@@ -1,4 +1,4 @@
-// How deep the hole goes beside the targets: the floor depth over the band.
+// Smoothing of the floor depth over the band.
 #pragma once
 
 #include <cstdint>
@@ -7,19 +7,6 @@
 #include "porthole/base/ids.h"
 
 namespace porthole {
-
-/// The pixels p with scale * |p - center|^2 <= weight, as deep as a target at the centre.
-struct FloorDisc {
-    Vec2i center;
-    std::int64_t weight = 0;
-    float depth = 0; ///< metres along camera -z
-};
-
-/// `depth` with, at every pixel of `box` outside the targets, the greatest depth of the discs
-/// that cover it; unchanged elsewhere.
-/// Cost: linear in the box plus, for each disc, its height: every pixel is painted once.
-[[nodiscard]] Image<float> paint_floor(Image<float> depth, const Image<PartId>& targets, std::vector<FloorDisc> discs,
-                                       std::int64_t scale, Rect box);
 
 /// `depth` with its pixels in `box` that are in `mask` and outside the targets replaced by the
 /// mean over the mask's pixels in the square of 2 radius + 1 pixels around them, `times` over.

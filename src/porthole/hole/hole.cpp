@@ -35,8 +35,11 @@ void check(std::span<const Vec2i> contour, const IdBuffer& targets, const Mask& 
         require(targets.id.at_or(p.x, p.y, kNoPart) != kNoPart, "grow_hole", "a contour pixel is not a target's");
 }
 
-/// Mask and distance of targets and discs; sites[i] is the disc of hole.band[i].
-void draw_discs(Hole& hole, const Image<PartId>& targets, std::span<const PowerSite> sites, Rect box, int depth_px) {
+/// Mask, distance and unsmoothed floor of targets and discs; sites[i] is the disc of
+/// hole.band[i].
+void draw_discs(Hole& hole, const IdBuffer& target_ids, std::span<const PowerSite> sites, Rect box, int depth_px) {
+    const Image<PartId>& targets = target_ids.id;
+    hole.floor_depth = target_ids.depth;
     const auto deep = -(float(depth_px) + kRimReach);
     hole.mask = Mask(hole.window);
     hole.distance = Image<float>(hole.window);
@@ -66,7 +69,10 @@ void draw_discs(Hole& hole, const Image<PartId>& targets, std::span<const PowerS
                 // (|p-c|^2 - r^2) / (|p-c| + r) = |p-c| - r, with the sign of the integer.
                 const std::int64_t value = power.value(x, y);
                 distance = std::min(kRimReach, float(double(value) / (double(kScale) * far_side)));
-                hole.mask(x, y) = value <= 0;
+                if (value > 0) continue;
+                hole.mask(x, y) = 1;
+                const Vec2i owner = sites[std::size_t(site)].center;
+                hole.floor_depth(x, y) = target_ids.depth(owner.x, owner.y);
             }
         }
 
@@ -176,7 +182,7 @@ Hole grow_hole(std::span<const Contour> contours, const IdBuffer& targets, const
     Hole hole;
     hole.window = targets.window();
     std::vector<PowerSite> sites;
-    std::vector<FloorDisc> discs;
+    bool any_band = false;
     const std::int64_t depth = params.depth_px;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
         const Vec2i c = pixels[i];
@@ -191,22 +197,16 @@ Hole grow_hole(std::span<const Contour> contours, const IdBuffer& targets, const
             const std::int64_t wanted = std::min(9 * depth * depth, clearance2[i]) * (kScale / 9);
             // A disc under a pixel wide holds no band, so half a pixel changes no mask.
             weight = std::max(weight, wanted);
-            if (wanted >= kScale) discs.push_back({c, wanted, targets.depth(c.x, c.y)});
+            any_band |= wanted >= kScale;
         }
         sites.push_back({c, weight});
     }
     // One pixel more than anything below the limit of the distances reaches.
     const Rect box = bounds_of(pixels).grown(params.depth_px + int(kRimReach) + 1).intersected(hole.window);
-    draw_discs(hole, targets.id, sites, pixels.empty() ? Rect{} : box, params.depth_px);
-
-    // The floor: the targets' own depths (+infinity elsewhere), and over the band what its
-    // discs bring along.
-    Image<float> floor = targets.depth;
-    if (!discs.empty()) {
-        floor = paint_floor(std::move(floor), targets.id, std::move(discs), kScale, box);
-        floor = blur_floor(std::move(floor), hole.mask, targets.id, box, int(std::lround(params.blur_px)), 2);
-    }
-    hole.floor_depth = std::move(floor);
+    draw_discs(hole, targets, sites, pixels.empty() ? Rect{} : box, params.depth_px);
+    if (any_band)
+        hole.floor_depth = blur_floor(std::move(hole.floor_depth), hole.mask, targets.id, box,
+                                      int(std::lround(params.blur_px)), 2);
     return hole;
 }
 

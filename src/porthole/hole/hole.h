@@ -55,8 +55,8 @@ struct Hole {
 /// enclosing object keeps its outline, and a band pixel is never nearer to it than twice the
 /// band's width there (the paper's k <= d/2, at every pixel).
 ///
-/// The floor depth of a band pixel is the greatest target depth among the contour pixels
-/// whose disc covers it, then box-blurred twice with radius params.blur_px, reading targets
+/// The floor depth of a band pixel is the target depth at the contour pixel whose disc owns it
+/// (the nearest in the power sense), then box-blurred twice with radius params.blur_px, reading targets
 /// and band, writing outside the targets.
 ///
 /// The signed distance is made for bilinear interpolation at the rim. In the band and outside

@@ -52,9 +52,11 @@ Case random_case(Rect window, std::mt19937& random) {
 }
 
 /// 9 |p-c|^2 <= min(9 depth^2, D^2(c)), for each covered contour pixel c.
-bool disc_covers(const Case& c, const Image<std::int64_t>& to_outside, const BandPixel& b, Vec2i p) {
+/// 9 |p-c|^2 - min(9 depth^2, D^2(c)): the disc covers p where it is not positive. kFar for
+/// pixels that grow no band.
+std::int64_t disc_power(const Case& c, const Image<std::int64_t>& to_outside, const BandPixel& b, Vec2i p) {
     const std::int64_t depth2 = 9 * std::int64_t(c.params.depth_px) * c.params.depth_px;
-    return b.covered && 9 * distance2(p, b.pixel) <= std::min(depth2, to_outside(b.pixel.x, b.pixel.y));
+    return b.covered ? 9 * distance2(p, b.pixel) - std::min(depth2, to_outside(b.pixel.x, b.pixel.y)) : kFar;
 }
 
 Image<std::int64_t> distance_to_outside(const Mask& enclosing) {
@@ -120,15 +122,23 @@ TEST(GrowHole, IsTheTargetsAndTheDiscsExactly) {
         for (std::int32_t y = w.y0; y < w.y1; ++y)
             for (std::int32_t x = w.x0; x < w.x1; ++x) {
                 const bool target = c.targets.id(x, y) != kNoPart;
-                float deepest = -kInfinity;
-                for (const BandPixel& b : hole.band)
-                    if (disc_covers(c, to_outside, b, {x, y}))
-                        deepest = std::max(deepest, c.targets.depth(b.pixel.x, b.pixel.y));
-                const bool inside = target || deepest > 0;
+                // The disc that owns the pixel; several may tie.
+                std::int64_t least = kFar;
+                std::set<float> owners;
+                for (const BandPixel& b : hole.band) {
+                    const std::int64_t power = disc_power(c, to_outside, b, {x, y});
+                    if (power > least) continue;
+                    if (power < least) owners.clear();
+                    least = power;
+                    owners.insert(c.targets.depth(b.pixel.x, b.pixel.y));
+                }
+                const bool inside = target || least <= 0;
                 ASSERT_EQ(hole.mask(x, y), inside) << x << ' ' << y << " round " << round;
-                // The floor is painted on the mask, all of it, and nowhere else.
-                const float floor = target ? c.targets.depth(x, y) : inside ? deepest : kInfinity;
-                ASSERT_EQ(hole.floor_depth(x, y), floor) << x << ' ' << y << " round " << round;
+                // The floor is the targets' own depth, then the owner's, and nowhere else.
+                const float floor = hole.floor_depth(x, y);
+                if (target) ASSERT_EQ(floor, c.targets.depth(x, y));
+                else if (inside) ASSERT_TRUE(owners.contains(floor)) << x << ' ' << y << " round " << round;
+                else ASSERT_EQ(floor, kInfinity);
                 ASSERT_EQ(hole.distance(x, y) <= 0, inside) << x << ' ' << y << " round " << round;
                 ASSERT_LE(hole.distance(x, y), kRimReach);
                 // Inside E, or a target's own pixel.
