@@ -201,6 +201,20 @@ bool read_png_rows(PngSource& source, png_structp png, png_infop info, std::int3
     return true;
 }
 
+/// libpng sets memory aside for a chunk before it knows whether the file is that long.
+/// @throws Error E0702 unless the chunks follow each other up to the end chunk.
+void check_png_chunks(Bytes bytes, const std::string& where) {
+    std::size_t at = 8;
+    while (bytes.size() - at >= 12) {
+        const std::uint32_t length = big_endian(bytes, at, 4);
+        if (length > bytes.size() - at - 12) break;
+        if (begins_with(bytes, "IEND", at + 4)) return;
+        at += 12 + std::size_t(length);
+    }
+    broken(where, "the PNG is damaged: the chunk at byte " + std::to_string(at) + " of " +
+                      std::to_string(bytes.size()) + " goes past the end; the file is cut short?");
+}
+
 std::vector<Rgba8> png_palette(png_structp png, png_infop info) {
     png_colorp colours = nullptr;
     png_bytep alpha = nullptr;
@@ -216,6 +230,7 @@ std::vector<Rgba8> png_palette(png_structp png, png_infop info) {
 
 Image<Rgba8> decode_png(Bytes bytes, const std::string& where, Warnings* warnings) {
     const ImageInfo size = png_info(bytes, where);
+    check_png_chunks(bytes, where);
     const auto source = std::make_unique<PngSource>();
     source->bytes = bytes;
     struct Reader {
