@@ -34,7 +34,8 @@ std::vector<ConfigEntry> parse_config(const std::string& text, const std::string
         std::vector<std::string> values;
         if (value.is_array())
             for (const auto& element : value) values.push_back(text_of(element, where, key));
-        else values.push_back(text_of(value, where, key));
+        else
+            values.push_back(text_of(value, where, key));
         entries.emplace_back(key, std::move(values));
     }
     return entries;

@@ -18,34 +18,36 @@ namespace porthole::cli {
 namespace {
 
 /// An option that takes one text and hands it to `read`, whose errors name it.
-template <typename Read>
-CLI::Option* add_read(CLI::App& app, const std::string& names, const std::string& help, const std::string& type,
-                      Read&& read) {
+template <typename Read> CLI::Option* add_read(CLI::App& app, const std::string& names, const std::string& help,
+                                               const std::string& type, Read&& read) {
     const std::string option = names.substr(0, names.find(','));
     return app
-        .add_option_function<std::string>(names, [read, option](const std::string& text) { read(text, option); }, help)
+        .add_option_function<std::string>(
+            names, [read, option](const std::string& text) { read(text, option); }, help)
         ->type_name(type);
 }
 
 /// A repeatable option: one value each time it is given.
-CLI::Option* add_list(CLI::App& app, const std::string& name, std::vector<std::string>& values, const std::string& help) {
+CLI::Option* add_list(CLI::App& app, const std::string& name, std::vector<std::string>& values,
+                      const std::string& help) {
     return app.add_option(name, values, help)->type_name("SEL")->allow_extra_args(false);
 }
 
 /// An option that takes one of a few words.
-template <typename Enum>
-CLI::Option* add_choice(CLI::App& app, const std::string& name, Enum& value, const std::vector<std::pair<std::string, Enum>>& choices,
-                        const std::string& help) {
+template <typename Enum> CLI::Option* add_choice(CLI::App& app, const std::string& name, Enum& value,
+                                                 const std::vector<std::pair<std::string, Enum>>& choices,
+                                                 const std::string& help) {
     std::string words;
     for (const auto& choice : choices) words += (words.empty() ? "" : "|") + choice.first;
-    return add_read(app, name, help, words, [&value, choices, words](const std::string& text, const std::string& option) {
-        for (const auto& choice : choices)
-            if (choice.first == text) {
-                value = choice.second;
-                return;
-            }
-        throw Error(ErrorKind::usage, "E0105", option, "\"" + text.substr(0, 80) + "\" is not one of " + words);
-    });
+    return add_read(
+        app, name, help, words, [&value, choices, words](const std::string& text, const std::string& option) {
+            for (const auto& choice : choices)
+                if (choice.first == text) {
+                    value = choice.second;
+                    return;
+                }
+            throw Error(ErrorKind::usage, "E0105", option, "\"" + text.substr(0, 80) + "\" is not one of " + words);
+        });
 }
 
 void add_model(CLI::App& app, CommonOptions& o) {
@@ -69,24 +71,29 @@ void add_common(CLI::App& app, CommonOptions& o) {
     add_read(app, "--up", "Axis of the file that points up (default y)", "y|z",
              [&o](const std::string& text, const std::string& option) { o.load.up = parse_up(text, option); });
     add_read(app, "--units", "Length unit of the file: m, cm, mm, um, km, in, ft or metres", "UNIT",
-             [&o](const std::string& text, const std::string& option) { o.load.metres_per_unit = parse_units(text, option); });
+             [&o](const std::string& text, const std::string& option) {
+                 o.load.metres_per_unit = parse_units(text, option);
+             });
     app.add_option("--time", o.load.time, "Seconds into the first animation (default: rest pose)")
         ->type_name("SECONDS")
         ->check(CLI::Range(0.0, 1e6));
     app.option_defaults()->group("Running");
-    app.add_option("--threads", o.threads, "Threads (default: one per processor)")->type_name("N")->check(CLI::Range(1, 1024));
+    app.add_option("--threads", o.threads, "Threads (default: one per processor)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1024));
     add_read(app, "--max-memory", "Most memory to take, such as 4G; exit 5 beyond it", "BYTES",
              [&o](const std::string& text, const std::string& option) { o.max_memory = parse_bytes(text, option); });
     app.add_flag("--quiet", o.quiet, "Say nothing but warnings and errors");
     app.add_flag("--verbose", o.verbose, "Say more");
-    add_choice<std::string>(app, "--log", o.log, {{"text", "text"}, {"json", "json"}}, "How messages are written to standard error");
+    add_choice<std::string>(app, "--log", o.log, {{"text", "text"}, {"json", "json"}},
+                            "How messages are written to standard error");
 }
 
 void add_camera(CLI::App& app, CameraParams& c) {
     app.option_defaults()->group("Camera");
     app.add_option("--camera", c.name,
-                      "auto, front, back, left, right, top, bottom, iso, or a camera of the file by name or #N "
-                      "(default auto)")
+                   "auto, front, back, left, right, top, bottom, iso, or a camera of the file by name or #N "
+                   "(default auto)")
         ->type_name("VIEW");
     const auto add_vector = [&](const char* name, std::optional<Vec3d>& v, const char* help) {
         add_read(app, name, help, "X,Y,Z",
@@ -99,7 +106,8 @@ void add_camera(CLI::App& app, CameraParams& c) {
     app.add_option("--camera-azimuth-angle", c.azimuth_deg, "Carries the eye round to the right")->type_name("DEGREES");
     app.add_option("--camera-elevation-angle", c.elevation_deg, "Carries the eye up")->type_name("DEGREES");
     app.add_option("--camera-zoom-factor", c.zoom, "2 shows things twice as large")->type_name("FACTOR");
-    app.add_option("--camera-view-angle", c.view_angle_deg, "Vertical angle of view (default 30)")->type_name("DEGREES");
+    app.add_option("--camera-view-angle", c.view_angle_deg, "Vertical angle of view (default 30)")
+        ->type_name("DEGREES");
     app.add_flag("--camera-orthographic", c.orthographic, "Parallel projection");
     add_choice<Framing>(app, "--frame", c.frame, {{"auto", Framing::automatic}, {"all", Framing::all}},
                         "auto: closer until targets span 15 % of the height; all: the whole model (default auto)");
@@ -107,17 +115,21 @@ void add_camera(CLI::App& app, CameraParams& c) {
 
 void add_picture(CLI::App& app, PictureOptions& o) {
     app.option_defaults()->group("Output");
-    app.add_option("-o,--output", o.output, "Picture: .png, .jpg, .jpeg, or - for a PNG on standard output (default out.png)")
+    app.add_option("-o,--output", o.output,
+                   "Picture: .png, .jpg, .jpeg, or - for a PNG on standard output (default out.png)")
         ->type_name("FILE");
     app.add_option("--report", o.report_path, "Write what was done as JSON")->type_name("FILE");
     app.add_flag("--json", o.json, "The report on standard output; no picture unless -o is given");
     add_read(app, "--size,--resolution", "Width and height in pixels (default 1920x1080)", "WxH",
              [&o](const std::string& text, const std::string& option) { o.size = parse_size(text, option); });
-    app.add_option("--bits", o.bits, "Bits per channel of a PNG (default 8)")->type_name("N")->check(CLI::IsMember({8, 16}));
+    app.add_option("--bits", o.bits, "Bits per channel of a PNG (default 8)")
+        ->type_name("N")
+        ->check(CLI::IsMember({8, 16}));
     app.add_flag("--no-clobber", o.no_clobber, "Leave existing files alone: exit 4 instead");
     app.option_defaults()->group("Look");
-    add_read(app, "--background", "#rrggbb, white or black (default white)", "COLOR",
-             [&o](const std::string& text, const std::string& option) { o.render.background = parse_color(text, option); });
+    add_read(
+        app, "--background", "#rrggbb, white or black (default white)", "COLOR",
+        [&o](const std::string& text, const std::string& option) { o.render.background = parse_color(text, option); });
     app.add_flag("--no-background", o.no_background, "Transparent where there is no model");
     app.add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 8)")
         ->type_name("N")
@@ -125,7 +137,8 @@ void add_picture(CLI::App& app, PictureOptions& o) {
     app.add_option("--ao-samples", o.render.ao_samples, "Ambient occlusion rays per pixel (default 4, 0: none)")
         ->type_name("N")
         ->check(CLI::Range(0, 256));
-    app.add_flag_callback("--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
+    app.add_flag_callback(
+        "--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
     add_choice<std::string>(app, "--isa", o.isa, {{"avx2", "avx2"}, {"native", "native"}},
                             "avx2: the same pixels on every machine; native: the fastest");
     add_camera(app, o.camera);
@@ -145,9 +158,10 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
              [&o](const std::string& text, const std::string& option) { o.plan.depth = parse_length(text, option); });
     add_choice<HoleStyle>(app, "--style", o.plan.style, {{"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
                           "hole: straight walls; paper: as the paper builds it (default hole)");
-    add_choice<ContourMethod>(app, "--contours", o.plan.contours,
-                              {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},
-                              "How targets' outlines are found (default exact)");
+    add_choice<ContourMethod>(
+        app, "--contours", o.plan.contours,
+        {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},
+        "How targets' outlines are found (default exact)");
     add_choice<Tight>(app, "--tight", o.plan.tight, {{"refuse", Tight::refuse}, {"open", Tight::open}},
                       "Targets without room for a band: refused, or opened all the same (default refuse)");
     app.add_flag("--strict", o.strict, "Exit 8 if some target is refused or absent, not only if all are");
@@ -167,7 +181,8 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
 
 void add_render(CLI::App& app, RenderOptions& o) {
     add_model(app, o.common);
-    add_list(app, "--focus", o.focus, "Frame the picture on these parts, as reveal does on its targets")->group("Camera");
+    add_list(app, "--focus", o.focus, "Frame the picture on these parts, as reveal does on its targets")
+        ->group("Camera");
     add_picture(app, o.picture);
     add_common(app, o.common);
     app.footer("Examples:\n"
@@ -229,14 +244,16 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& e) {
     const bool extra = dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr;
     if (!unknown.empty() && (extra || dynamic_cast<const CLI::RequiredError*>(&e) != nullptr)) {
         // An unknown option is named rather than the value after it, whatever their order.
-        const auto option = std::find_if(unknown.begin(), unknown.end(), [](const std::string& u) { return u.starts_with('-'); });
+        const auto option =
+            std::find_if(unknown.begin(), unknown.end(), [](const std::string& u) { return u.starts_with('-'); });
         const std::string& word = option == unknown.end() ? unknown.front() : *option;
         std::vector<std::string> known;
         for (const CLI::App* sub : called)
             for (const CLI::Option* o : sub->get_options())
                 for (const std::string& name : o->get_lnames()) known.push_back("--" + name);
         if (called.empty())
-            for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) known.push_back(sub->get_name());
+            for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; }))
+                known.push_back(sub->get_name());
         reason = "\"" + word.substr(0, 80) + "\" is not known here";
         const std::vector<std::string> near =
             word.size() < 3 ? std::vector<std::string>{} : nearest_names(word.substr(0, word.find('=')), known, 2);
@@ -261,7 +278,8 @@ int run(const CLI::App& app, CommandLine& line, Output& out, const std::stop_tok
     const auto start = [&](const CommonOptions& common) {
         out.configure(common.quiet, common.verbose, common.log == "json");
         limit_memory(common);
-        return Control{stop, [&out](std::string_view stage, double share) { out.progress(stage, share); }, common.threads};
+        return Control{stop, [&out](std::string_view stage, double share) { out.progress(stage, share); },
+                       common.threads};
     };
     if (app.got_subcommand("reveal")) {
         default_output(line.reveal.picture);

@@ -86,12 +86,15 @@ std::uint64_t parse_bytes(const std::string& text, const std::string& option) {
     const std::optional<double> value = take_number(rest);
     if (!value) refuse(option, text, "an amount of memory such as 512M or 4G");
     std::string unit = lowered(std::string(rest));
-    if (unit.ends_with("ib")) unit.resize(unit.size() - 2);
-    else if (unit.ends_with('b')) unit.pop_back();
+    if (unit.ends_with("ib"))
+        unit.resize(unit.size() - 2);
+    else if (unit.ends_with('b'))
+        unit.pop_back();
     const int shift = unit.empty() ? 0 : unit == "k" ? 10 : unit == "m" ? 20 : unit == "g" ? 30 : unit == "t" ? 40 : -1;
     if (shift < 0) refuse(option, text, "an amount of memory such as 512M or 4G");
     const double bytes = *value * double(std::uint64_t(1) << shift);
-    if (bytes < double(1 << 24) || bytes > double(std::uint64_t(1) << 50)) refuse(option, text, "between 16M and 1024T");
+    if (bytes < double(1 << 24) || bytes > double(std::uint64_t(1) << 50))
+        refuse(option, text, "between 16M and 1024T");
     return std::uint64_t(bytes);
 }
 

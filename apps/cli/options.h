@@ -16,7 +16,7 @@ struct CommonOptions {
     LoadParams load;
     int threads = 0; ///< 0: one per processor
     bool quiet = false, verbose = false;
-    std::string log = "text"; ///< or "json": messages as JSON lines
+    std::string log = "text";     ///< or "json": messages as JSON lines
     std::uint64_t max_memory = 0; ///< bytes; 0: as much as load.max_bytes says
 };
 
@@ -57,12 +57,13 @@ struct PartsOptions {
 
 /// Readers of single values. `option` is named by the error.
 /// @throws Error usage E0105.
-[[nodiscard]] Vec2i parse_size(const std::string& text, const std::string& option);        ///< "1920x1080", 1..32768 each
-[[nodiscard]] Vec3f parse_color(const std::string& text, const std::string& option);       ///< "#rrggbb", white, black; linear
-[[nodiscard]] Length parse_length(const std::string& text, const std::string& option);     ///< "54", "54px", "5%", "3mm"
-[[nodiscard]] double parse_units(const std::string& text, const std::string& option);      ///< "mm", "in", "0.01": metres
+[[nodiscard]] Vec2i parse_size(const std::string& text, const std::string& option); ///< "1920x1080", 1..32768 each
+[[nodiscard]] Vec3f parse_color(const std::string& text,
+                                const std::string& option); ///< "#rrggbb", white, black; linear
+[[nodiscard]] Length parse_length(const std::string& text, const std::string& option); ///< "54", "54px", "5%", "3mm"
+[[nodiscard]] double parse_units(const std::string& text, const std::string& option);  ///< "mm", "in", "0.01": metres
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& text, const std::string& option); ///< "512M", "4G"
-[[nodiscard]] Vec3d parse_vector(const std::string& text, const std::string& option);      ///< "1,2,3"
-[[nodiscard]] char parse_up(const std::string& text, const std::string& option);           ///< "y", "+Z"
+[[nodiscard]] Vec3d parse_vector(const std::string& text, const std::string& option);        ///< "1,2,3"
+[[nodiscard]] char parse_up(const std::string& text, const std::string& option);             ///< "y", "+Z"
 
 } // namespace porthole::cli

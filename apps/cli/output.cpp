@@ -12,7 +12,7 @@ namespace porthole::cli {
 
 namespace {
 
-constexpr int kShownWarnings = 20; ///< of one code
+constexpr int kShownWarnings = 20;        ///< of one code
 constexpr std::size_t kShownBytes = 1000; ///< of a place or a reason
 
 std::string json_line(const nlohmann::ordered_json& j) {
@@ -48,8 +48,8 @@ void Output::message(std::string_view level, std::string_view code, std::string_
         return;
     }
     clear_bar();
-    write_stderr("porthole: " + std::string(level) + '[' + std::string(code) + "]: " + place + (place.empty() ? "" : ": ") +
-                 why + '\n');
+    write_stderr("porthole: " + std::string(level) + '[' + std::string(code) + "]: " + place +
+                 (place.empty() ? "" : ": ") + why + '\n');
 }
 
 void Output::error(const Error& e) {
@@ -140,9 +140,7 @@ void Output::done(std::string_view note) {
     clear_bar();
 }
 
-void print(std::string_view text) {
-    write_file("-", std::as_bytes(std::span(text)));
-}
+void print(std::string_view text) { write_file("-", std::as_bytes(std::span(text))); }
 
 std::string with_commas(std::int64_t n) {
     std::string digits = std::to_string(n);

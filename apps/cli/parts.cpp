@@ -63,13 +63,28 @@ std::vector<std::string> segments_of(const std::string& path) {
     }
 }
 
-std::string table(const Scene& scene, const std::vector<Closedness>& closed) {
-    const Bounds3d whole = scene_bounds(scene);
+/// What is worth knowing of the parts beyond the scene.
+struct Facts {
+    std::vector<Closedness> closed; ///< by mesh
+    std::vector<Bounds3d> boxes;    ///< by part
+    Bounds3d whole;
+};
+
+Facts find_facts(const Scene& scene, const Control& control) {
+    Facts facts{closedness(scene, control), std::vector<Bounds3d>(scene.parts.size()), {}};
+    parallel_for(scene.parts.size(), control,
+                 [&](std::size_t i) { facts.boxes[i] = part_bounds(scene, PartId{std::uint32_t(i)}); });
+    for (const Bounds3d& box : facts.boxes) facts.whole.extend(box);
+    return facts;
+}
+
+std::string table(const Scene& scene, const Facts& facts) {
+    const Bounds3d& whole = facts.whole;
     const Unit unit = unit_for(whole.diagonal());
     std::string text = escaped(scene.source) + ": " + scene.format + ", " +
                        with_commas(std::int64_t(scene.parts.size())) + " parts, " +
-                       with_commas(std::int64_t(triangle_count(scene))) + " triangles, " +
-                       in_unit(whole.size(), unit) + '\n';
+                       with_commas(std::int64_t(triangle_count(scene))) + " triangles, " + in_unit(whole.size(), unit) +
+                       '\n';
     if (scene.parts.empty()) return text;
     const auto row = [&](const std::string& id, const std::string& triangles, const std::string& surface,
                          const std::string& size, const std::string& material, const std::string& name) {
@@ -91,7 +106,7 @@ std::string table(const Scene& scene, const std::vector<Closedness>& closed) {
             row("", "", "", "", "", std::string(2 * std::min<std::size_t>(k, 40), ' ') + escaped(above[k]) + '/');
         const Mesh& mesh = scene.meshes[part.mesh];
         row('#' + std::to_string(i), with_commas(std::int64_t(mesh.triangles.size())),
-            closed[part.mesh].closed ? "closed" : "open", in_unit(part_bounds(scene, PartId{std::uint32_t(i)}).size(), unit),
+            facts.closed[part.mesh].closed ? "closed" : "open", in_unit(facts.boxes[i].size(), unit),
             joined(materials_of(scene, part), 20),
             std::string(2 * std::min<std::size_t>(above.size(), 40), ' ') + escaped(path.back()));
     }
@@ -100,7 +115,7 @@ std::string table(const Scene& scene, const std::vector<Closedness>& closed) {
 
 nlohmann::ordered_json numbers(Vec3d v) { return {v.x, v.y, v.z}; }
 
-std::string as_json(const Scene& scene, const std::vector<Closedness>& closed) {
+std::string as_json(const Scene& scene, const Facts& facts) {
     using Json = nlohmann::ordered_json;
     Json j;
     j["version"] = PORTHOLE_VERSION;
@@ -109,12 +124,12 @@ std::string as_json(const Scene& scene, const std::vector<Closedness>& closed) {
                   {"format", scene.format},
                   {"parts", scene.parts.size()},
                   {"triangles", triangle_count(scene)},
-                  {"size_m", numbers(scene_bounds(scene).size())}};
+                  {"size_m", numbers(facts.whole.size())}};
     Json parts = Json::array();
     for (std::size_t i = 0; i < scene.parts.size(); ++i) {
         const Part& part = scene.parts[i];
-        const Closedness& c = closed[part.mesh];
-        const Bounds3d box = part_bounds(scene, PartId{std::uint32_t(i)});
+        const Closedness& c = facts.closed[part.mesh];
+        const Bounds3d& box = facts.boxes[i];
         parts.push_back({{"id", i},
                          {"path", part.path},
                          {"name", part.name},
@@ -139,8 +154,8 @@ std::string as_json(const Scene& scene, const std::vector<Closedness>& closed) {
 
 int run_parts(const PartsOptions& options, Output& out, const Control& control) {
     const Scene scene = load(options.common, out, control);
-    const std::vector<Closedness> closed = closedness(scene, control);
-    print(options.json ? as_json(scene, closed) : table(scene, closed));
+    const Facts facts = find_facts(scene, control);
+    print(options.json ? as_json(scene, facts) : table(scene, facts));
     return kExitDone;
 }
 

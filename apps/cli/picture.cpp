@@ -50,7 +50,8 @@ void check_outputs(const PictureOptions& options, std::uint64_t max_memory) {
     };
     const std::string& out = options.output;
     if (!out.empty() && out != "-" && lower_extension(out) != ".png" && !is_jpeg(out))
-        throw usage("E0106", "--output " + out, "the name must end in .png, .jpg or .jpeg, or be - for a PNG on standard output");
+        throw usage("E0106", "--output " + out,
+                    "the name must end in .png, .jpg or .jpeg, or be - for a PNG on standard output");
     if (is_jpeg(out) && options.bits != 8) throw usage("E0106", "--bits", "JPEG has 8 bits a channel; write a .png");
     if (is_jpeg(out) && options.no_background)
         throw usage("E0106", "--no-background", "JPEG has no transparency; write a .png");

@@ -20,7 +20,8 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     out.progress("build", 0);
     const MeshBvhs meshes = build_mesh_bvhs(scene, {.isa = picture.isa}, control);
     const Bvh whole = build_bvh(meshes, all_parts(scene));
-    const View view = make_view(scene, frame_subject(scene, focus, control), picture.camera, picture.size.x, picture.size.y);
+    const View view =
+        make_view(scene, frame_subject(scene, focus, control), picture.camera, picture.size.x, picture.size.y);
     report.run.build = building.seconds();
 
     const Stopwatch drawing;

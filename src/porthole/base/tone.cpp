@@ -45,7 +45,7 @@ public:
 
 private:
     static constexpr unsigned kShift = 23 - MantissaBits;
-    static constexpr bool kOneStep = Max <= 255; ///< buckets so fine that none holds two thresholds
+    static constexpr bool kOneStep = Max <= 255;                   ///< buckets so fine that none holds two thresholds
     static constexpr float kLow = Max > 255 ? 0x1p-21f : 0x1p-13f; ///< below the first threshold
 
     [[nodiscard]] static std::size_t bucket_of(float v) {

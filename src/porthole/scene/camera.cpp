@@ -11,8 +11,8 @@ namespace porthole {
 
 namespace {
 
-constexpr double kBorder = 0.045;       ///< of the picture's width and height, on each side
-constexpr double kTargetSpan = 0.15;    ///< of the picture's height, what targets should span
+constexpr double kBorder = 0.045;    ///< of the picture's width and height, on each side
+constexpr double kTargetSpan = 0.15; ///< of the picture's height, what targets should span
 constexpr double kGolden = std::numbers::pi * (3.0 - 2.2360679774997896964); ///< golden angle
 
 double radians(double degrees) { return degrees * (std::numbers::pi / 180.0); }
@@ -48,7 +48,7 @@ Vec3d rotated(Vec3d v, Vec3d unit_axis, double angle) {
 
 /// What framing works on: the eye and the half height of the picture in a fixed orientation.
 struct Placement {
-    Vec3d eye; ///< in the axes
+    Vec3d eye;              ///< in the axes
     double half_height = 1; ///< tangent, or metres when orthographic
 };
 
@@ -70,8 +70,8 @@ Bounds3d bounds_of(const Points& points) {
 /// The least length that may fill the picture: float coordinates this far from the origin
 /// still tell its pixels apart.
 double resolved_extent(const Bounds3d& b) {
-    const double far_off = std::max({std::abs(b.lower.x), std::abs(b.lower.y), std::abs(b.lower.z),
-                                     std::abs(b.upper.x), std::abs(b.upper.y), std::abs(b.upper.z)});
+    const double far_off = std::max({std::abs(b.lower.x), std::abs(b.lower.y), std::abs(b.lower.z), std::abs(b.upper.x),
+                                     std::abs(b.upper.y), std::abs(b.upper.z)});
     return far_off > 0 ? 1e-4 * far_off : 1e-3;
 }
 
@@ -102,8 +102,7 @@ Placement fit(const Points& points, double aspect, double tangent, bool orthogra
     if (orthographic) {
         const Vec3d c = centre ? *centre : box.center();
         double half = pad;
-        for (const Vec3d p : points)
-            half = std::max({half, std::abs(p.y - c.y), std::abs(p.x - c.x) / aspect});
+        for (const Vec3d p : points) half = std::max({half, std::abs(p.y - c.y), std::abs(p.x - c.x) / aspect});
         return {{c.x, c.y, box.upper.z + std::max(box.diagonal(), pad)}, half / use};
     }
     // Every point must lie inside four planes through the eye. Each plane's support over the
@@ -130,8 +129,10 @@ Placement fit(const Points& points, double aspect, double tangent, bool orthogra
     for (int pass = 0; pass < 6; ++pass) {
         const Vec2d off = seen_at(points, eye, false).centre();
         const double depth = eye.z - box.center().z;
-        if (wide) eye.y += off.y * depth;
-        else eye.x += off.x * depth;
+        if (wide)
+            eye.y += off.y * depth;
+        else
+            eye.x += off.x * depth;
     }
     return {eye, tangent};
 }
@@ -202,8 +203,7 @@ Vec3d turned(Vec3d back, Vec3d up, const CameraParams& p) {
 }
 
 /// The view from direction `back`, framed; of the whole subject if it has no targets.
-View framed(const FrameSubject& subject, Vec3d back, const CameraParams& p, int width, int height,
-            const Vec3d* focal) {
+View framed(const FrameSubject& subject, Vec3d back, const CameraParams& p, int width, int height, const Vec3d* focal) {
     const double aspect = double(width) / double(height), tangent = std::tan(radians(p.view_angle_deg) / 2);
     const Vec3d up = p.view_up.value_or(Vec3d{0, 1, 0});
     const Axes axes = look(turned(normalize(back), up, p), up);
@@ -317,7 +317,8 @@ std::vector<Vec3f> extremes(std::span<const Vec3f> points) {
                 extreme[j] |= (d[k + j] >= highest[k + j] ? -1 : 0) | (d[k + j] <= lowest[k + j] ? -1 : 0);
         if (std::ranges::count(extreme, 0) == 8) return;
         for (std::size_t k = 0; k < kDirections; ++k) {
-            if (d[k] > highest[k] || (d[k] == highest[k] && less(i, at_highest[k]))) highest[k] = d[k], at_highest[k] = i;
+            if (d[k] > highest[k] || (d[k] == highest[k] && less(i, at_highest[k])))
+                highest[k] = d[k], at_highest[k] = i;
             if (d[k] < lowest[k] || (d[k] == lowest[k] && less(i, at_lowest[k]))) lowest[k] = d[k], at_lowest[k] = i;
         }
     };
@@ -419,8 +420,8 @@ View make_view(const Scene& scene, const FrameSubject& subject, const CameraPara
     const Vec3d to_centre = (box.empty() ? Vec3d{} : box.center()) - m.p;
     const double reach = std::max(-dot(to_centre, back), 1e-3 * length(to_centre));
     View view = placed(subject, p, m.p, focal.value_or(m.p - back * (reach > 0 ? reach : 1.0)), width, height);
-    view.half_height = float((camera.orthographic ? double(camera.half_height) : std::tan(double(camera.fov_y) / 2)) /
-                             params.zoom);
+    view.half_height =
+        float((camera.orthographic ? double(camera.half_height) : std::tan(double(camera.fov_y) / 2)) / params.zoom);
     return view;
 }
 

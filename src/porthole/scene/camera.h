@@ -28,10 +28,10 @@ struct CameraParams {
     std::optional<Vec3d> focal_point{}; ///< kept in the picture's centre
     std::optional<Vec3d> view_up{};
     std::optional<Vec3d> direction{}; ///< the way the camera looks
-    double azimuth_deg = 0;         ///< the eye goes round the focal point, to the right
-    double elevation_deg = 0;       ///< and up
-    double zoom = 1;                ///< > 0; 2 shows things twice as large
-    double view_angle_deg = 30;     ///< vertical, (0, 180)
+    double azimuth_deg = 0;           ///< the eye goes round the focal point, to the right
+    double elevation_deg = 0;         ///< and up
+    double zoom = 1;                  ///< > 0; 2 shows things twice as large
+    double view_angle_deg = 30;       ///< vertical, (0, 180)
     bool orthographic = false;
     Framing frame = Framing::automatic;
 };

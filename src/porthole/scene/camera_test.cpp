@@ -66,8 +66,8 @@ TEST(Camera, NamedSidesLookAsTheySay) {
     const struct {
         const char* name;
         Vec3f right, up;
-    } sides[] = {{"front", {1, 0, 0}, {0, 1, 0}}, {"back", {-1, 0, 0}, {0, 1, 0}}, {"left", {0, 0, 1}, {0, 1, 0}},
-                 {"right", {0, 0, -1}, {0, 1, 0}}, {"top", {1, 0, 0}, {0, 0, -1}}, {"bottom", {1, 0, 0}, {0, 0, 1}}};
+    } sides[] = {{"front", {1, 0, 0}, {0, 1, 0}},  {"back", {-1, 0, 0}, {0, 1, 0}}, {"left", {0, 0, 1}, {0, 1, 0}},
+                 {"right", {0, 0, -1}, {0, 1, 0}}, {"top", {1, 0, 0}, {0, 0, -1}},  {"bottom", {1, 0, 0}, {0, 0, 1}}};
     for (const auto& side : sides) {
         const View v = make_view(scene, subject, {.name = side.name}, 640, 360);
         expect_sound(v, side.name);
@@ -158,7 +158,8 @@ TEST(Camera, AnySizeFlatOrPointLikeStaysFinite) {
                         const Seen s = seen(v, scene.meshes[1].positions);
                         ASSERT_GT(s.nearest, 0) << what;
                         ASSERT_TRUE(s.x0 >= -1 && s.x1 <= 321 && s.y0 >= -1 && s.y1 <= 201)
-                            << what << " extent " << extent.x << extent.y << extent.z << " at " << offset.x << ": " << s.x0 << " " << s.x1 << " " << s.y0 << " " << s.y1;
+                            << what << " extent " << extent.x << extent.y << extent.z << " at " << offset.x << ": "
+                            << s.x0 << " " << s.x1 << " " << s.y0 << " " << s.y1;
                         const Ray r = v.ray(0.5f, 0.5f);
                         ASSERT_TRUE(is_finite(r.origin) && is_finite(r.direction)) << what;
                     }
@@ -209,7 +210,8 @@ TEST(Camera, F3dOptions) {
     scene.origin = {100, 0, 0};
     const FrameSubject subject = frame_subject(scene, {});
     {
-        const View v = make_view(scene, subject, {.position = Vec3d{100, 0, 7}, .focal_point = Vec3d{100, 0, 0}}, 64, 64);
+        const View v =
+            make_view(scene, subject, {.position = Vec3d{100, 0, 7}, .focal_point = Vec3d{100, 0, 0}}, 64, 64);
         EXPECT_NEAR(length(v.eye() - Vec3f{0, 0, 7}), 0, 1e-5) << "file coordinates less the origin";
         EXPECT_NEAR(length(v.forward() - Vec3f{0, 0, -1}), 0, 1e-6);
         EXPECT_NEAR(v.half_height, std::tan(15 * kPi / 180), 1e-6);

@@ -71,8 +71,10 @@ Closedness closedness(const Mesh& mesh) {
             const std::uint32_t upper = row[i].upper;
             for (; i < row.size() && row[i].upper == upper; ++i) ++total, forward += row[i].forward;
             ++out.edges;
-            if (total == 1) ++out.open_edges;
-            else if (total != 2 || forward != 1) ++out.odd_edges;
+            if (total == 1)
+                ++out.open_edges;
+            else if (total != 2 || forward != 1)
+                ++out.odd_edges;
         }
     }
     out.closed = out.edges > 0 && out.open_edges == 0 && out.odd_edges == 0;

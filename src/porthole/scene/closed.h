@@ -10,10 +10,10 @@
 namespace porthole {
 
 struct Closedness {
-    bool closed = false;            ///< there are triangles and neither open nor odd edges
-    std::uint64_t edges = 0;        ///< distinct edges after welding
-    std::uint64_t open_edges = 0;   ///< with one triangle
-    std::uint64_t odd_edges = 0;    ///< with two triangles of the same direction, or more than two
+    bool closed = false;          ///< there are triangles and neither open nor odd edges
+    std::uint64_t edges = 0;      ///< distinct edges after welding
+    std::uint64_t open_edges = 0; ///< with one triangle
+    std::uint64_t odd_edges = 0;  ///< with two triangles of the same direction, or more than two
 };
 
 /// Judges one mesh after welding its vertices by exact position (-0 equals 0) and leaving

@@ -8,8 +8,7 @@ namespace {
 /// A box with eight corners and twelve triangles, outward.
 Mesh box() {
     Mesh mesh;
-    for (int i = 0; i < 8; ++i)
-        mesh.positions.push_back({float(i & 1), float(i >> 1 & 1), float(i >> 2 & 1)});
+    for (int i = 0; i < 8; ++i) mesh.positions.push_back({float(i & 1), float(i >> 1 & 1), float(i >> 2 & 1)});
     mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
                       {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
     return mesh;

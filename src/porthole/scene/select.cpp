@@ -16,9 +16,7 @@ namespace {
 constexpr std::size_t kMaxSelector = 4096; ///< bytes
 constexpr std::size_t kShownName = 80;     ///< bytes of a name that a hint shows
 
-std::string_view without_prefix(std::string_view text, std::string_view prefix) {
-    return text.substr(prefix.size());
-}
+std::string_view without_prefix(std::string_view text, std::string_view prefix) { return text.substr(prefix.size()); }
 
 /// At most `limit` bytes of `text`, not ending inside a UTF-8 sequence.
 std::string shortened(std::string_view text, std::size_t limit) {
@@ -81,9 +79,8 @@ std::vector<PartId> by_expression(const Scene& scene, const std::string& express
 #endif
     try {
         const std::regex regex(expression, flags);
-        return parts_where(scene, [&](const Part& p) {
-            return std::regex_search(p.name, regex) || std::regex_search(p.path, regex);
-        });
+        return parts_where(
+            scene, [&](const Part& p) { return std::regex_search(p.name, regex) || std::regex_search(p.path, regex); });
     } catch (const std::regex_error& e) {
         throw Error(ErrorKind::usage, "E0111", where, std::string("the expression cannot be used: ") + e.what());
     }
@@ -111,17 +108,14 @@ std::string hint(std::string_view wanted, std::span<const std::string> names) {
 }
 
 [[noreturn]] void throw_miss(const Scene& scene, const std::string& selector, const std::string& where) {
-    const auto miss = [&](const std::string& reason) -> Error {
-        return {ErrorKind::usage, "E0110", where, reason};
-    };
+    const auto miss = [&](const std::string& reason) -> Error { return {ErrorKind::usage, "E0110", where, reason}; };
     if (scene.parts.empty()) throw miss("the model has no parts");
     std::vector<std::string> names;
     if (selector.starts_with("mat:")) {
         for (const Material& m : scene.materials) names.push_back(m.name);
         throw miss("no part has such a material" + hint(without_prefix(selector, "mat:"), names));
     }
-    if (id_of(selector))
-        throw miss("no such part; ids go from 0 to " + std::to_string(scene.parts.size() - 1));
+    if (id_of(selector)) throw miss("no such part; ids go from 0 to " + std::to_string(scene.parts.size() - 1));
     if (selector.starts_with("re:"))
         throw miss("no name or path of the " + std::to_string(scene.parts.size()) + " parts matches");
     std::string_view wanted = selector;
@@ -281,8 +275,10 @@ std::vector<std::string> nearest_names(std::string_view wanted, std::span<const 
     for (std::size_t i = 0; i < names.size() && seen.size() < kMostNames; ++i) {
         if (names[i].empty() || !seen.insert(names[i]).second) continue;
         const std::string name = lowered(std::string_view(names[i]).substr(0, 4 * kCompared));
-        if (name == plain) candidates.push_back({0, 0, i});
-        else if (name.find(plain) != std::string::npos) candidates.push_back({1, name.size(), i});
+        if (name == plain)
+            candidates.push_back({0, 0, i});
+        else if (name.find(plain) != std::string::npos)
+            candidates.push_back({1, name.size(), i});
         else if (const int d = edit_distance(plain, std::string_view(name).substr(0, kCompared), limit); d <= limit)
             candidates.push_back({1 + d, name.size(), i});
     }

@@ -78,8 +78,7 @@ TEST(Select, Prefixes) {
 }
 
 TEST(Select, CountsPerSelector) {
-    const std::vector<SelectorMatch> matches =
-        match_selectors(kEngine, std::vector<std::string>{"rod_1", "**/valve"});
+    const std::vector<SelectorMatch> matches = match_selectors(kEngine, std::vector<std::string>{"rod_1", "**/valve"});
     ASSERT_EQ(matches.size(), 2u);
     EXPECT_EQ(matches[0].selector, "rod_1");
     EXPECT_EQ(matches[0].parts.size(), 2u);
@@ -103,7 +102,7 @@ TEST(Select, MissNamesTheNearest) {
 
 TEST(Select, RefusesWhatCannotBeRead) {
     for (const std::string& selector : {std::string(), std::string(5000, 'a'), std::string("re:("),
-                                       std::string("re:(a)\\1"), std::string("re:(a{1000}){1000}{1000}")})
+                                        std::string("re:(a)\\1"), std::string("re:(a{1000}){1000}{1000}")})
         EXPECT_EQ(error_of(kEngine, selector).code, "E0111") << selector.substr(0, 20);
     EXPECT_EQ(error_of(kEngine, "#99999999999999999999999").code, "E0110");
 }
@@ -123,8 +122,7 @@ TEST(Select, GlobAgreesWithPlainRecursion) {
         bool segments;
         [[nodiscard]] bool matches(std::string_view p, std::string_view t, bool at_segment) const {
             if (p.empty()) return t.empty();
-            if (p[0] != '*')
-                return !t.empty() && t[0] == p[0] && matches(p.substr(1), t.substr(1), p[0] == '/');
+            if (p[0] != '*') return !t.empty() && t[0] == p[0] && matches(p.substr(1), t.substr(1), p[0] == '/');
             const std::size_t stars = std::min(p.find_first_not_of('*'), p.size());
             const std::string_view rest = p.substr(stars);
             if (segments && stars > 1 && at_segment && rest.starts_with('/')) {
