@@ -17,8 +17,9 @@ namespace {
 
 // Names along a path are repeated for every part below them: a bound on the sum keeps a small
 // file with one long name or a deep chain from filling the memory.
-constexpr std::uint64_t kMostNames = std::uint64_t(4) << 20;
-constexpr std::uint64_t kMostNameBytes = std::uint64_t(256) << 20;
+constexpr std::uint64_t kMostNames = std::uint64_t(2) << 20;
+constexpr std::size_t kDeepTree = 10000; // no modeller nests this deep
+constexpr std::uint64_t kMostNameBytes = std::uint64_t(64) << 20;
 
 Json parse(const Container& container, const std::string& file, std::uint64_t max_bytes, bool& repaired) {
     try {
@@ -97,7 +98,8 @@ std::vector<Affine3d> world_from_bind(const Document& doc, std::span<const Acces
         read_floats(*inverse_bind, j, 1, 16, f);
         const double m[16] = {f[0], f[1], f[2],  f[3],  f[4],  f[5],  f[6],  f[7],
                               f[8], f[9], f[10], f[11], f[12], f[13], f[14], f[15]};
-        out.push_back(joint * Affine3d{{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}, {m[12], m[13], m[14]}});
+        out.push_back(joint *
+                      Affine3d{{m[0], m[1], m[2]}, {m[4], m[5], m[6]}, {m[8], m[9], m[10]}, {m[12], m[13], m[14]}});
     }
     return out;
 }
@@ -147,6 +149,19 @@ std::vector<std::uint32_t> visible_nodes(std::span<const Node> nodes, std::span<
     return order;
 }
 
+std::size_t depth_of(std::span<const Node> nodes) {
+    std::vector<std::size_t> level(nodes.size(), 1);
+    std::vector<std::uint32_t> top;
+    for (std::uint32_t i = 0; i < nodes.size(); ++i)
+        if (nodes[i].parent == kNone) top.push_back(i);
+    std::size_t deepest = 0;
+    for (const std::uint32_t i : depth_first(nodes, top)) {
+        if (nodes[i].parent != kNone) level[i] = level[std::size_t(nodes[i].parent)] + 1;
+        deepest = std::max(deepest, level[i]);
+    }
+    return deepest;
+}
+
 // Whether the transform can be undone and keeps the mesh within single precision.
 bool is_usable(const Affine3d& m, const Bounds3f& bounds) {
     const double x = length(m.x), y = length(m.y), z = length(m.z);
@@ -186,7 +201,8 @@ std::vector<std::string> path_segments(std::span<const Node> nodes, std::span<co
     return segments;
 }
 
-void add_parts(Document& doc, std::span<const Node> nodes, const Placed& placed, std::vector<Mesh> meshes, Scene& scene) {
+void add_parts(Document& doc, std::span<const Node> nodes, const Placed& placed, std::vector<Mesh> meshes,
+               Scene& scene) {
     std::vector<std::string> names(nodes.size());
     for (std::size_t i = 0; i < nodes.size(); ++i) names[i] = called(doc, nodes[i]);
     const std::vector<std::string> segments = path_segments(nodes, names);
@@ -204,7 +220,8 @@ void add_parts(Document& doc, std::span<const Node> nodes, const Placed& placed,
         const std::int32_t mesh = mesh_of[p.request];
         if (mesh == kNone) continue; // its primitives have warned
         if (!is_usable(p.world_from_mesh, scene.meshes[std::size_t(mesh)].bounds)) {
-            doc.warn("W0305", *node.json, {}, "the part is flat, or beyond 1.8e18, after its transforms; it is left out");
+            doc.warn("W0305", *node.json, {},
+                     "the part is flat, or beyond 1.8e18, after its transforms; it is left out");
             continue;
         }
         std::vector<std::string> chain;
@@ -212,7 +229,9 @@ void add_parts(Document& doc, std::span<const Node> nodes, const Placed& placed,
             chain.push_back(segments[std::size_t(k)]);
             name_bytes += chain.back().size() + 1;
             if (++name_count > kMostNames || name_bytes > kMostNameBytes)
-                doc.fail_limit(doc.root(), "nodes", "the paths of all parts would take over 256 MB; the tree is too deep or its names too long");
+                doc.fail_limit(
+                    doc.root(), "nodes",
+                    "the paths of all parts would take over 64 MB; the tree is too deep or its names too long");
         }
         std::reverse(chain.begin(), chain.end());
         chains.push_back(std::move(chain));
@@ -250,11 +269,15 @@ void read_light(Document& doc, const Node& node, const Affine3d& world, Scene& s
     light.name = name_of(doc, json);
     if (light.name.empty()) light.name = name_of(doc, *node.json);
     const std::string_view type = doc.string_or(json, "type");
-    if (type == "directional") light.kind = Light::Kind::directional;
-    else if (type == "point") light.kind = Light::Kind::point;
-    else if (type == "spot") light.kind = Light::Kind::spot;
+    if (type == "directional")
+        light.kind = Light::Kind::directional;
+    else if (type == "point")
+        light.kind = Light::Kind::point;
+    else if (type == "spot")
+        light.kind = Light::Kind::spot;
     else {
-        doc.warn("W0306", json, "type", "is \"" + shortened(type) + "\", expected directional, point or spot; the light is left out");
+        doc.warn("W0306", json, "type",
+                 "is \"" + shortened(type) + "\", expected directional, point or spot; the light is left out");
         return;
     }
     double color[3] = {1, 1, 1};
@@ -273,8 +296,10 @@ void read_light(Document& doc, const Node& node, const Affine3d& world, Scene& s
                       light.intensity >= 0 && std::isfinite(light.intensity) && range > 0 && light.inner_cone >= 0 &&
                       light.outer_cone > light.inner_cone && light.outer_cone <= kPi / 2 + 1e-3f &&
                       is_finite(light.position) && !(light.direction == Vec3f{0, 0, 0});
-    if (!good) doc.warn("W0306", json, {}, "the light cannot be used: a value or its transform is out of range");
-    else scene.lights.push_back(std::move(light));
+    if (!good)
+        doc.warn("W0306", json, {}, "the light cannot be used: a value or its transform is out of range");
+    else
+        scene.lights.push_back(std::move(light));
 }
 
 Scene read(const FileBytes& file, const std::filesystem::path& path, const LoadParams& params, const Control& control) {
@@ -291,6 +316,7 @@ Scene read(const FileBytes& file, const std::filesystem::path& path, const LoadP
     if (container.trailing_bytes) doc.warn("W0307", doc.root(), {}, "bytes after the end of the GLB are ignored");
     check_asset(doc);
     check_extensions(doc);
+    check_names(doc);
     progress(0.1);
 
     const std::vector<Buffer> buffers = read_buffers(doc, container, path);
@@ -303,6 +329,9 @@ Scene read(const FileBytes& file, const std::filesystem::path& path, const LoadP
     if (params.time >= 0) animate(doc, accessors, params.time, nodes);
     const std::vector<Affine3d> world = world_transforms(nodes);
     const std::vector<std::uint32_t> drawn = visible_nodes(nodes, scene_roots(doc, nodes));
+    if (const std::size_t levels = depth_of(nodes); levels > kDeepTree)
+        doc.warn("W0307", doc.root(), "nodes",
+                 "the tree is " + std::to_string(levels) + " levels deep; is that meant?");
     const Placed placed = place_meshes(doc, accessors, nodes, drawn, world);
     progress(0.2);
 

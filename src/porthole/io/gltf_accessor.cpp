@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 #include <utility>
 
 namespace porthole::gltf {
@@ -17,7 +19,12 @@ int components_of(std::string_view type) {
 
 std::optional<Component> component_of(std::uint64_t code) {
     switch (code) {
-    case 5120: case 5121: case 5122: case 5123: case 5125: case 5126: return Component(code);
+    case 5120:
+    case 5121:
+    case 5122:
+    case 5123:
+    case 5125:
+    case 5126: return Component(code);
     default: return std::nullopt;
     }
 }
@@ -60,7 +67,8 @@ void read_sparse(const Document& doc, std::span<const BufferView> views, const J
         doc.fail("E0303", *indices, "componentType", "sparse indices must be unsigned integers");
     index.stride = component_bytes(index.component);
     const BufferView& index_view = views[doc.need_index(*indices, "bufferView", views.size(), "buffer view")];
-    index.data = bytes_at(doc, index_view, doc.uint_or(*indices, "byteOffset", 0), n * index.stride, *indices, "byteOffset");
+    index.data =
+        bytes_at(doc, index_view, doc.uint_or(*indices, "byteOffset", 0), n * index.stride, *indices, "byteOffset");
     const BufferView& value_view = views[doc.need_index(*values, "bufferView", views.size(), "buffer view")];
     accessor.sparse_data = bytes_at(doc, value_view, doc.uint_or(*values, "byteOffset", 0),
                                     n * accessor.element_bytes(), *values, "byteOffset");
@@ -78,12 +86,14 @@ void read_sparse(const Document& doc, std::span<const BufferView> views, const J
     }
 }
 
-float as_float(std::int8_t v, bool normalized) { return normalized ? std::max(float(v) / 127.0f, -1.0f) : float(v); }
-float as_float(std::uint8_t v, bool normalized) { return normalized ? float(v) / 255.0f : float(v); }
-float as_float(std::int16_t v, bool normalized) { return normalized ? std::max(float(v) / 32767.0f, -1.0f) : float(v); }
-float as_float(std::uint16_t v, bool normalized) { return normalized ? float(v) / 65535.0f : float(v); }
-float as_float(std::uint32_t v, bool) { return float(v); }
-float as_float(float v, bool) { return v; }
+template <typename T, bool kNormalized> float as_float(T v) {
+    if constexpr (!kNormalized || sizeof(T) == 4)
+        return static_cast<float>(v);
+    else if constexpr (std::is_signed_v<T>)
+        return std::max(float(v) / float(std::numeric_limits<T>::max()), -1.0f);
+    else
+        return float(v) / float(std::numeric_limits<T>::max());
+}
 
 template <typename T> T load(const std::byte* p) {
     T value;
@@ -91,28 +101,41 @@ template <typename T> T load(const std::byte* p) {
     return value;
 }
 
-template <typename T, int kWidth>
-void convert(const std::byte* in, std::size_t stride, std::size_t count, bool normalized, float* out, int width,
-             int used, float fill) {
-    const int w = kWidth > 0 ? kWidth : width;
-    for (std::size_t i = 0; i < count; ++i, in += stride, out += w) {
+// kWidth components of each element; 0: as many as `used`, then `fill` up to `width`.
+template <typename T, bool kNormalized, int kWidth>
+void convert(const std::byte* in, std::size_t stride, std::size_t count, float* out, int width, int used, float fill) {
+    for (std::size_t i = 0; i < count; ++i, in += stride) {
         if constexpr (kWidth > 0) {
-            for (int k = 0; k < kWidth; ++k) out[k] = as_float(load<T>(in + std::size_t(k) * sizeof(T)), normalized);
+            for (int k = 0; k < kWidth; ++k)
+                *out++ = as_float<T, kNormalized>(load<T>(in + std::size_t(k) * sizeof(T)));
         } else {
-            for (int k = 0; k < used; ++k) out[k] = as_float(load<T>(in + std::size_t(k) * sizeof(T)), normalized);
-            for (int k = used; k < w; ++k) out[k] = fill;
+            for (int k = 0; k < used; ++k) *out++ = as_float<T, kNormalized>(load<T>(in + std::size_t(k) * sizeof(T)));
+            for (int k = used; k < width; ++k) *out++ = fill;
         }
     }
 }
 
-template <typename T>
-void convert_any(const Accessor& a, const std::byte* in, std::size_t stride, std::size_t count, int width, float* out,
-                 float fill) {
+template <typename T, bool kNormalized> void convert_width(const Accessor& a, const std::byte* in, std::size_t stride,
+                                                           std::size_t count, int width, float* out, float fill) {
     const int used = std::min(width, a.components);
-    if (a.components == width && width == 2) convert<T, 2>(in, stride, count, a.normalized, out, 2, 2, fill);
-    else if (a.components >= 3 && a.components <= 4 && width == 3) convert<T, 3>(in, stride, count, a.normalized, out, 3, 3, fill);
-    else if (a.components == 4 && width == 4) convert<T, 4>(in, stride, count, a.normalized, out, 4, 4, fill);
-    else convert<T, 0>(in, stride, count, a.normalized, out, width, used, fill);
+    if (used < width || width > 4)
+        convert<T, kNormalized, 0>(in, stride, count, out, width, used, fill);
+    else if (width == 1)
+        convert<T, kNormalized, 1>(in, stride, count, out, width, used, fill);
+    else if (width == 2)
+        convert<T, kNormalized, 2>(in, stride, count, out, width, used, fill);
+    else if (width == 3)
+        convert<T, kNormalized, 3>(in, stride, count, out, width, used, fill);
+    else
+        convert<T, kNormalized, 4>(in, stride, count, out, width, used, fill);
+}
+
+template <typename T> void convert_any(const Accessor& a, const std::byte* in, std::size_t stride, std::size_t count,
+                                       int width, float* out, float fill) {
+    if (a.normalized)
+        convert_width<T, true>(a, in, stride, count, width, out, fill);
+    else
+        convert_width<T, false>(a, in, stride, count, width, out, fill);
 }
 
 void convert_elements(const Accessor& a, const std::byte* in, std::size_t stride, std::size_t count, int width,
@@ -129,6 +152,10 @@ void convert_elements(const Accessor& a, const std::byte* in, std::size_t stride
 
 template <typename T>
 void widen(const Accessor& a, const std::byte* in, std::size_t stride, std::size_t count, std::uint32_t* out) {
+    if (stride == sizeof(T) * std::size_t(a.components)) { // packed, as indices always are
+        for (std::size_t i = 0; i < count * std::size_t(a.components); ++i) out[i] = load<T>(in + i * sizeof(T));
+        return;
+    }
     for (std::size_t i = 0; i < count; ++i, in += stride)
         for (int k = 0; k < a.components; ++k) *out++ = load<T>(in + std::size_t(k) * sizeof(T));
 }
@@ -200,8 +227,8 @@ std::vector<Accessor> read_accessors(Document& doc, std::span<const BufferView> 
             }
             // Counts are below 2^53 and strides below 2^9: the product cannot wrap.
             const std::uint64_t last = (a.count - 1) * a.stride + (matrix ? element - column + bytes * rows : element);
-            const bool stride_to_blame = view->stride != 0 && offset <= view->length &&
-                                         a.count * element <= view->length - offset;
+            const bool stride_to_blame =
+                view->stride != 0 && offset <= view->length && a.count * element <= view->length - offset;
             if (stride_to_blame && last > view->length - offset) {
                 const Json& at = doc.list(doc.root(), "bufferViews")[*view_index];
                 doc.fail("E0301", at, "byteStride",
@@ -236,9 +263,12 @@ void read_floats(const Accessor& a, std::size_t first, std::size_t count, int wi
 void read_uints(const Accessor& a, std::size_t first, std::size_t count, std::uint32_t* out) {
     const std::size_t width = std::size_t(a.components);
     const std::byte* in = a.data ? a.data + first * a.stride : nullptr;
-    if (!in) std::fill_n(out, count * width, 0u);
-    else if (a.component == Component::u32 && a.stride == 4 * width) std::memcpy(out, in, count * a.stride);
-    else widen_elements(a, in, a.stride, count, out);
+    if (!in)
+        std::fill_n(out, count * width, 0u);
+    else if (a.component == Component::u32 && a.stride == 4 * width)
+        std::memcpy(out, in, count * a.stride);
+    else
+        widen_elements(a, in, a.stride, count, out);
     for_each_sparse(a, first, count,
                     [&](std::size_t at, const std::byte* bytes) { widen_elements(a, bytes, 0, 1, out + at * width); });
 }

@@ -28,13 +28,17 @@ struct Curve {
 };
 
 // The curve of a sampler for `width` values per key; false after a warning when it has none.
-bool read_curve(Document& doc, std::span<const Accessor> accessors, const Json& sampler, std::size_t width, Curve& curve) {
+bool read_curve(Document& doc, std::span<const Accessor> accessors, const Json& sampler, std::size_t width,
+                Curve& curve) {
     const Accessor& input = accessors[doc.need_index(sampler, "input", accessors.size(), "accessor")];
     const Accessor& output = accessors[doc.need_index(sampler, "output", accessors.size(), "accessor")];
     const std::string_view name = doc.string_or(sampler, "interpolation", "LINEAR");
-    if (name == "STEP") curve.interpolation = Interpolation::step;
-    else if (name == "CUBICSPLINE") curve.interpolation = Interpolation::cubic;
-    else if (name != "LINEAR") doc.warn("W0309", sampler, "interpolation", "is \"" + shortened(name) + "\"; LINEAR is used");
+    if (name == "STEP")
+        curve.interpolation = Interpolation::step;
+    else if (name == "CUBICSPLINE")
+        curve.interpolation = Interpolation::cubic;
+    else if (name != "LINEAR")
+        doc.warn("W0309", sampler, "interpolation", "is \"" + shortened(name) + "\"; LINEAR is used");
 
     const std::uint64_t per_key = width * (curve.interpolation == Interpolation::cubic ? 3 : 1);
     if (input.components != 1 || output.components == 0 ||
@@ -65,14 +69,15 @@ std::size_t target_count(const Document& doc, const Node& node) {
     return primitives.empty() ? 0 : doc.list(primitives[0], "targets").size();
 }
 
-void apply_channel(Document& doc, std::span<const Accessor> accessors, std::span<const Json> samplers, const Json& channel,
-                   double time, std::vector<Node>& nodes) {
+void apply_channel(Document& doc, std::span<const Accessor> accessors, std::span<const Json> samplers,
+                   const Json& channel, double time, std::vector<Node>& nodes) {
     const Json* target = doc.object(channel, "target");
     if (!target) doc.fail("E0303", channel, {}, "has no \"target\", which glTF requires");
     const std::string_view path = doc.string_or(*target, "path");
     const auto node_index = doc.index(*target, "node", nodes.size(), "node");
     if (!node_index) {
-        if (path == "pointer") doc.warn("W0309", *target, {}, "KHR_animation_pointer is not supported; the channel is left out");
+        if (path == "pointer")
+            doc.warn("W0309", *target, {}, "KHR_animation_pointer is not supported; the channel is left out");
         return; // glTF: a channel without a node is ignored
     }
     Node& node = nodes[*node_index];
@@ -81,11 +86,14 @@ void apply_channel(Document& doc, std::span<const Accessor> accessors, std::span
                               : path == "weights"                      ? target_count(doc, node)
                                                                        : 0;
     if (width == 0) {
-        doc.warn("W0309", *target, "path", "\"" + shortened(path) + "\" cannot be animated here; the channel is left out");
+        doc.warn("W0309", *target, "path",
+                 "\"" + shortened(path) + "\" cannot be animated here; the channel is left out");
         return;
     }
     if (node.has_matrix && path != "weights") {
-        doc.warn("W0309", *target, "node", "node " + std::to_string(*node_index) + " has a matrix, which cannot be animated; the channel is left out");
+        doc.warn("W0309", *target, "node",
+                 "node " + std::to_string(*node_index) +
+                     " has a matrix, which cannot be animated; the channel is left out");
         return;
     }
     Curve curve;
@@ -93,10 +101,14 @@ void apply_channel(Document& doc, std::span<const Accessor> accessors, std::span
     if (!read_curve(doc, accessors, samplers[sampler], width, curve)) return;
     const std::vector<double> v =
         sample_curve(curve.times, curve.values, int(width), curve.interpolation, path == "rotation", time);
-    if (path == "translation") node.translation = {v[0], v[1], v[2]};
-    else if (path == "scale") node.scale = {v[0], v[1], v[2]};
-    else if (path == "rotation") node.rotation = {v[0], v[1], v[2], v[3]};
-    else node.weights.assign(v.begin(), v.end());
+    if (path == "translation")
+        node.translation = {v[0], v[1], v[2]};
+    else if (path == "scale")
+        node.scale = {v[0], v[1], v[2]};
+    else if (path == "rotation")
+        node.rotation = {v[0], v[1], v[2], v[3]};
+    else
+        node.weights.assign(v.begin(), v.end());
 }
 
 } // namespace
@@ -110,7 +122,8 @@ std::vector<double> sample_curve(std::span<const float> times, std::span<const f
         return double(values[(cubic ? key * 3 + part : key) * w + k]);
     };
     // The segment [i, i + 1] that holds `time`; outside, the first or last key alone.
-    const auto after = std::upper_bound(times.begin(), times.end(), time, [](double t, float key) { return t < double(key); });
+    const auto after =
+        std::upper_bound(times.begin(), times.end(), time, [](double t, float key) { return t < double(key); });
     const std::size_t next = std::size_t(after - times.begin());
     const std::size_t i = next == 0 ? 0 : next - 1;
     std::vector<double> out(w);

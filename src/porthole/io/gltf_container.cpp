@@ -26,7 +26,8 @@ std::uint32_t word_at(std::span<const std::byte> file, std::size_t offset) {
 Container open_glb(std::span<const std::byte> file, const std::string& name) {
     const auto num = [](std::uint64_t v) { return std::to_string(v); };
     if (file.size() < 12)
-        fail("E0301", name, file.size(), "the GLB header ends at byte " + num(file.size()) + " of 12; the file is truncated?");
+        fail("E0301", name, file.size(),
+             "the GLB header ends at byte " + num(file.size()) + " of 12; the file is truncated?");
     const std::uint32_t version = word_at(file, 4), length = word_at(file, 8);
     if (version != 2)
         fail("E0304", name, 4, "GLB version " + num(version) + ", expected 2; convert the file to glTF 2.0");
@@ -47,8 +48,8 @@ Container open_glb(std::span<const std::byte> file, const std::string& name) {
         const std::uint32_t size = word_at(file, at), type = word_at(file, at + 4);
         if (size > length - at - 8)
             fail("E0301", name, at,
-                 "chunk " + num(chunk) + " of " + num(size) + " bytes passes the end of the GLB at byte " + num(length) +
-                     " (the file has " + num(file.size()) + "); the file is truncated?");
+                 "chunk " + num(chunk) + " of " + num(size) + " bytes passes the end of the GLB at byte " +
+                     num(length) + " (the file has " + num(file.size()) + "); the file is truncated?");
         const std::span<const std::byte> data = file.subspan(at + 8, size);
         if (chunk == 0 && type != kJsonChunk) fail("E0310", name, at + 4, "the first GLB chunk is not JSON");
         if (type == kJsonChunk) {
@@ -58,7 +59,8 @@ Container open_glb(std::span<const std::byte> file, const std::string& name) {
             c.json = {reinterpret_cast<const char*>(data.data()), data.size()};
             c.json_offset = at + 8;
         } else if (type == kBinChunk) {
-            if (chunk != 1) fail("E0310", name, at + 4, "the BIN chunk must be the second one, this is number " + num(chunk));
+            if (chunk != 1)
+                fail("E0310", name, at + 4, "the BIN chunk must be the second one, this is number " + num(chunk));
             c.has_bin = true;
             c.bin = data;
         } // Other kinds are for extensions: glTF says to skip them.
@@ -68,6 +70,26 @@ Container open_glb(std::span<const std::byte> file, const std::string& name) {
     // Chunks are padded to 4 bytes, with spaces by the book but with zeros by some writers.
     while (!c.json.empty() && c.json.back() == '\0') c.json.remove_suffix(1);
     return c;
+}
+
+std::optional<std::vector<std::byte>> decode_percent(std::string_view text) {
+    const auto digit = [](char c) {
+        return c >= '0' && c <= '9'   ? c - '0'
+               : c >= 'a' && c <= 'f' ? c - 'a' + 10
+               : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                      : -1;
+    };
+    std::vector<std::byte> out;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] != '%') {
+            out.push_back(std::byte(text[i]));
+            continue;
+        }
+        if (i + 2 >= text.size() || digit(text[i + 1]) < 0 || digit(text[i + 2]) < 0) return std::nullopt;
+        out.push_back(std::byte(digit(text[i + 1]) * 16 + digit(text[i + 2])));
+        i += 2;
+    }
+    return out;
 }
 
 } // namespace
@@ -116,11 +138,12 @@ std::optional<std::vector<std::byte>> decode_base64(std::string_view text) {
 Bytes read_uri(std::string_view uri, const std::filesystem::path& model, const std::string& where) {
     if (uri.starts_with("data:")) {
         const auto comma = uri.find(',');
-        if (comma == uri.npos || !uri.substr(0, comma).ends_with(";base64"))
-            throw Error(ErrorKind::input, "E0307", where,
-                        "data URI without \";base64,\": " + shortened(uri) + "; other encodings are not read");
-        auto decoded = decode_base64(uri.substr(comma + 1));
-        if (!decoded) throw Error(ErrorKind::input, "E0307", where, "the data URI is not valid base64: " + shortened(uri));
+        if (comma == uri.npos)
+            throw Error(ErrorKind::input, "E0307", where, "data URI without a comma: " + shortened(uri));
+        const std::string_view text = uri.substr(comma + 1);
+        auto decoded = uri.substr(0, comma).ends_with(";base64") ? decode_base64(text) : decode_percent(text);
+        if (!decoded)
+            throw Error(ErrorKind::input, "E0307", where, "the data URI cannot be decoded: " + shortened(uri));
         auto owner = std::make_shared<std::vector<std::byte>>(std::move(*decoded));
         return {*owner, owner};
     }
@@ -149,9 +172,12 @@ std::vector<Buffer> read_buffers(Document& doc, const Container& container, cons
         const Json* uri = Document::find(json, "uri");
         const std::string_view text = doc.string_or(json, "uri");
 
-        if (fallback) buffer.undefined = true; // its views are decoded from another buffer
-        else if (uri) buffer.bytes = read_uri(text, model, doc.where(*uri));
-        else if (i == 0 && container.has_bin) buffer.bytes.data = container.bin;
+        if (fallback)
+            buffer.undefined = true; // its views are decoded from another buffer
+        else if (uri)
+            buffer.bytes = read_uri(text, model, doc.where(*uri));
+        else if (i == 0 && container.has_bin)
+            buffer.bytes.data = container.bin;
         else if (i == 0 && container.glb && length > 0)
             doc.fail("E0307", json, {}, "has no URI, and the GLB has no BIN chunk; the file is truncated?");
         else {

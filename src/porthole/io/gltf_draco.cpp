@@ -2,6 +2,7 @@
 
 #include <cstring>
 #include <new>
+#include <stdexcept>
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -27,7 +28,7 @@ bool claimed_triangles(std::span<const std::byte> bytes, std::uint64_t& triangle
     if (!buffer.Decode(&major) || !buffer.Decode(&minor) || !buffer.Decode(&type) || !buffer.Decode(&method) ||
         !buffer.Decode(&flags))
         return false;
-    const std::uint16_t version = DRACO_BITSTREAM_VERSION(major, minor);
+    const auto version = static_cast<std::uint16_t>(DRACO_BITSTREAM_VERSION(major, minor));
     buffer.set_bitstream_version(version);
     if (version >= DRACO_BITSTREAM_VERSION(1, 3) && (flags & METADATA_FLAG_MASK)) {
         draco::GeometryMetadata metadata;

@@ -89,8 +89,18 @@ void check_asset(const Document& doc) {
     // A later minor version is read as far as it is known, if the file itself is consistent.
     if (!(least <= version) || least.major != 2)
         doc.fail("E0304", *asset, "minVersion",
-                 "asks for version " + std::to_string(least.major) + "." + std::to_string(least.minor) + " of a file of version " +
-                     std::to_string(version.major) + "." + std::to_string(version.minor));
+                 "asks for version " + std::to_string(least.major) + "." + std::to_string(least.minor) +
+                     " of a file of version " + std::to_string(version.major) + "." + std::to_string(version.minor));
+}
+
+void check_names(Document& doc) {
+    for (const auto& [key, list] : doc.root().get_ref<const Json::object_t&>()) {
+        if (!list.is_array()) continue;
+        for (const Json& element : list) {
+            const Json* name = element.is_object() ? Document::find(element, "name") : nullptr;
+            if (name && !name->is_string()) doc.warn("W0303", *name, {}, "is a name that is no text; ignored");
+        }
+    }
 }
 
 void check_extensions(Document& doc) {
@@ -106,7 +116,8 @@ void check_extensions(Document& doc) {
                      "the file requires the extension \"" + shortened(name) +
                          "\", which porthole does not read; export it without");
         if (known->support == Support::partial)
-            doc.warn("W0308", value, {}, "the extension \"" + std::string(name) + "\" is not supported; the model is drawn without it");
+            doc.warn("W0308", value, {},
+                     "the extension \"" + std::string(name) + "\" is not supported; the model is drawn without it");
     }
     for (const Json& value : doc.list(doc.root(), "extensionsUsed")) {
         const Known* known = find_known(text_of(value));

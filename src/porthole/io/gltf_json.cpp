@@ -52,7 +52,8 @@ private:
                         "the JSON has more than " + std::to_string(max_values_) +
                             " values; raise the memory limit to read it");
         if (open_.empty()) return &(root_ = Json(std::forward<T>(value)));
-        if (open_.back()->is_array()) return &open_.back()->get_ref<Json::array_t&>().emplace_back(std::forward<T>(value));
+        if (open_.back()->is_array())
+            return &open_.back()->get_ref<Json::array_t&>().emplace_back(std::forward<T>(value));
         return &(*slot_ = Json(std::forward<T>(value)));
     }
     bool open(Json::value_t kind) {
@@ -83,9 +84,12 @@ std::string type_error(const Json& value, std::string_view expected) {
 std::string escape_pointer(std::string_view token) {
     std::string out;
     for (const char c : token) {
-        if (c == '~') out += "~0";
-        else if (c == '/') out += "~1";
-        else out += c;
+        if (c == '~')
+            out += "~0";
+        else if (c == '/')
+            out += "~1";
+        else
+            out += c;
     }
     return out;
 }
@@ -138,9 +142,9 @@ std::string Document::pointer_of(const Json& at) const {
 }
 
 std::string Document::where(const Json& at, std::string_view below) const {
-    std::string place = file_ + ':' + pointer_of(at);
-    if (!below.empty()) place += '/' + std::string(below);
-    return place;
+    std::string pointer = pointer_of(at);
+    if (!below.empty()) pointer += '/' + std::string(below);
+    return pointer.empty() ? file_ : file_ + ':' + pointer;
 }
 
 void Document::fail(const char* code, const Json& at, std::string_view below, const std::string& reason) const {
@@ -159,7 +163,8 @@ void Document::warn(const char* code, const Json& at, std::string_view below, co
 Warnings Document::take_warnings() {
     for (const auto& [code, count] : count_by_code_)
         if (count > kWarningsPerCode)
-            warnings_.push_back({code, file_, std::to_string(count - kWarningsPerCode) + " more warnings of this kind"});
+            warnings_.push_back(
+                {code, file_, std::to_string(count - kWarningsPerCode) + " more warnings of this kind"});
     count_by_code_.clear();
     return std::move(warnings_);
 }
@@ -195,7 +200,7 @@ std::span<const Json> Document::list_of_objects(const Json& object, std::string_
 }
 
 std::optional<std::uint64_t> Document::as_uint(const Json& value) {
-    if (value.is_number_unsigned()) {
+    if (value.is_number_integer() && (value.is_number_unsigned() || value.get<std::int64_t>() >= 0)) {
         const auto v = value.get<std::uint64_t>();
         return v <= (1ull << 53) ? std::optional(v) : std::nullopt;
     }

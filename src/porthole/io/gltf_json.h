@@ -40,7 +40,8 @@ public:
     [[nodiscard]] const Json& root() const { return root_; }
     [[nodiscard]] const std::string& file() const { return file_; }
 
-    /// "<file>:<JSON pointer of at>", followed by "/<below>" if that is not empty.
+    /// "<file>:<JSON pointer of at>", followed by "/<below>" if that is not empty; the file
+    /// alone for the root.
     [[nodiscard]] std::string where(const Json& at, std::string_view below = {}) const;
     [[noreturn]] void fail(const char* code, const Json& at, std::string_view below, const std::string& reason) const;
     [[noreturn]] void fail_limit(const Json& at, std::string_view below, const std::string& reason) const;

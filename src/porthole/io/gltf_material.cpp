@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "porthole/io/gltf_node.h"
+
 namespace porthole::gltf {
 namespace {
 
@@ -12,7 +14,8 @@ float number_in(Document& doc, const Json& object, std::string_view key, double 
     const double value = doc.number_or(object, key, fallback);
     if (value >= low && value <= high) return static_cast<float>(value);
     const double used = std::isnan(value) ? fallback : std::clamp(value, low, high);
-    doc.warn("W0303", object, key, "is " + std::to_string(value) + ", out of range; " + std::to_string(used) + " is used");
+    doc.warn("W0303", object, key,
+             "is " + std::to_string(value) + ", out of range; " + std::to_string(used) + " is used");
     return static_cast<float>(used);
 }
 
@@ -78,22 +81,27 @@ void read_extensions(Document& doc, const Json& json, TextureReader& textures, M
         m.attenuation_color = color3_in(doc, *e, "attenuationColor", {1, 1, 1});
         if (Document::find(*e, "attenuationDistance")) {
             const double distance = doc.number_or(*e, "attenuationDistance", 0);
-            if (distance > 0) m.attenuation_distance = static_cast<float>(distance);
-            else doc.warn("W0303", *e, "attenuationDistance", "is not positive; the volume does not absorb");
+            if (distance > 0)
+                m.attenuation_distance = static_cast<float>(distance);
+            else
+                doc.warn("W0303", *e, "attenuationDistance", "is not positive; the volume does not absorb");
         }
     }
 }
 
 Material read_material(Document& doc, const Json& json, TextureReader& textures) {
     Material m;
-    m.name = std::string(doc.string_or(json, "name"));
+    m.name = name_of(doc, json);
     const Json* pbr = doc.object(json, "pbrMetallicRoughness");
     const Json* spec = doc.extension(json, "KHR_materials_pbrSpecularGlossiness");
-    if (spec) read_specular_glossiness(doc, *spec, textures, m);
-    else if (pbr) read_metallic_roughness(doc, *pbr, textures, m);
+    if (spec)
+        read_specular_glossiness(doc, *spec, textures, m);
+    else if (pbr)
+        read_metallic_roughness(doc, *pbr, textures, m);
 
     m.normal_texture = textures.read(json, "normalTexture");
-    if (const Json* info = doc.object(json, "normalTexture")) m.normal_scale = static_cast<float>(doc.number_or(*info, "scale", 1));
+    if (const Json* info = doc.object(json, "normalTexture"))
+        m.normal_scale = static_cast<float>(doc.number_or(*info, "scale", 1));
     m.occlusion_texture = textures.read(json, "occlusionTexture");
     if (const Json* info = doc.object(json, "occlusionTexture"))
         m.occlusion_strength = number_in(doc, *info, "strength", 1, 0, 1);
@@ -101,9 +109,12 @@ Material read_material(Document& doc, const Json& json, TextureReader& textures)
     m.emissive = color3_in(doc, json, "emissiveFactor", {0, 0, 0});
 
     const std::string_view mode = doc.string_or(json, "alphaMode", "OPAQUE");
-    if (mode == "MASK") m.alpha_mode = AlphaMode::mask;
-    else if (mode == "BLEND") m.alpha_mode = AlphaMode::blend;
-    else if (mode != "OPAQUE") doc.warn("W0303", json, "alphaMode", "is \"" + shortened(mode) + "\"; OPAQUE is used");
+    if (mode == "MASK")
+        m.alpha_mode = AlphaMode::mask;
+    else if (mode == "BLEND")
+        m.alpha_mode = AlphaMode::blend;
+    else if (mode != "OPAQUE")
+        doc.warn("W0303", json, "alphaMode", "is \"" + shortened(mode) + "\"; OPAQUE is used");
     m.alpha_cutoff = number_in(doc, json, "alphaCutoff", 0.5, 0, 1e30);
     m.double_sided = doc.bool_or(json, "doubleSided", false);
     read_extensions(doc, json, textures, m);
@@ -127,8 +138,8 @@ MaterialSet read_materials(Document& doc, std::span<const std::uint8_t> used, st
         set.material_of.back() = static_cast<std::uint32_t>(set.materials.size());
         set.materials.emplace_back();
     }
+    set.images = textures.decode_images(params, control); // first: equal images are brought together
     set.textures = textures.take_textures();
-    set.images = textures.decode_images(params, control);
     return set;
 }
 

@@ -103,7 +103,8 @@ Layout lay_out(const Document& doc, const Shape& shape, const Json& mesh_json) {
     std::unordered_map<const Accessor*, std::vector<std::size_t>> by_position;
     for (const Primitive& p : shape.primitives) {
         if (p.topology == Topology::none || p.triangles == 0) continue;
-        Placed placed{&p, static_cast<std::uint32_t>(layout.vertices), static_cast<std::uint32_t>(layout.triangles), true};
+        Placed placed{&p, static_cast<std::uint32_t>(layout.vertices), static_cast<std::uint32_t>(layout.triangles),
+                      true};
         // Many exporters cut one vertex array into primitives by material: keep it one array.
         std::vector<std::size_t>& candidates = by_position[p.attributes.position];
         for (const std::size_t i : candidates) {
@@ -128,15 +129,16 @@ Layout lay_out(const Document& doc, const Shape& shape, const Json& mesh_json) {
         layout.placed.push_back(placed);
     }
     for (const Placed& placed : layout.placed) // these get corners of their own, see flatten_submeshes
-        if (layout.normals && !placed.primitive->attributes.normal) layout.flat_corners += placed.primitive->triangles * 3;
+        if (layout.normals && !placed.primitive->attributes.normal)
+            layout.flat_corners += placed.primitive->triangles * 3;
     if (layout.vertices + layout.flat_corners > 0xFFFFFFF0u)
         doc.fail_limit(mesh_json, {}, "has over 2^32 vertices, more than one mesh can hold");
     return layout;
 }
 
 std::uint64_t bytes_of(const Layout& l) {
-    const std::uint64_t vertex = 12 + (l.normals ? 12 : 0) + (l.tangents ? 16 : 0) + (l.uv[0] ? 8 : 0) +
-                                 (l.uv[1] ? 8 : 0) + (l.colors ? 16 : 0);
+    const std::uint64_t vertex =
+        12 + (l.normals ? 12 : 0) + (l.tangents ? 16 : 0) + (l.uv[0] ? 8 : 0) + (l.uv[1] ? 8 : 0) + (l.colors ? 16 : 0);
     return (l.vertices + l.flat_corners) * vertex + l.triangles * 12;
 }
 
@@ -195,8 +197,10 @@ void report(Document& doc, std::span<const MeshRequest> requests, std::span<cons
         BadIndices bad;
         std::uint64_t unknown_joints = 0;
         for (; j < jobs.size() && jobs[j].request == job.request && jobs[j].placed == job.placed; ++j) {
-            if (bad.triangles == 0) bad = jobs[j].bad;
-            else bad.triangles += jobs[j].bad.triangles;
+            if (bad.triangles == 0)
+                bad = jobs[j].bad;
+            else
+                bad.triangles += jobs[j].bad.triangles;
             unknown_joints += jobs[j].faults.unknown_joints;
         }
         const Primitive& p = *layouts[job.request].placed[job.placed].primitive;
@@ -207,7 +211,8 @@ void report(Document& doc, std::span<const MeshRequest> requests, std::span<cons
                          " has index " + text(bad.first_index) + ", but there are " + text(p.vertices) + " vertices");
         if (unknown_joints > 0)
             doc.warn("W0307", *p.json, "attributes/JOINTS_0",
-                     text(unknown_joints) + " vertices name joints that the skin does not have; its first joint is used");
+                     text(unknown_joints) +
+                         " vertices name joints that the skin does not have; its first joint is used");
     }
     std::uint64_t degenerate = 0, meshes = 0;
     const Json* last = nullptr;
@@ -252,7 +257,8 @@ std::vector<std::uint8_t> used_materials(const Document& doc, std::span<const Me
     std::vector<std::uint8_t> used(materials + 1, 0);
     for (const MeshRequest& request : requests)
         for (const Json& primitive : doc.list_of_objects(meshes[request.mesh], "primitives"))
-            used[doc.index(primitive, "material", materials, "material").value_or(static_cast<std::uint32_t>(materials))] = 1;
+            used[doc.index(primitive, "material", materials, "material")
+                     .value_or(static_cast<std::uint32_t>(materials))] = 1;
     return used;
 }
 
@@ -303,7 +309,8 @@ std::vector<Mesh> build_meshes(Document& doc, const MeshSource& source, std::spa
     std::vector<MeshRepair> repairs(requests.size());
     parallel_for(requests.size(), control, [&](std::size_t r) {
         repairs[r] = finish(layouts[r], repair[r] != 0, meshes[r]);
-        meshes[r].name = std::string(doc.string_or(mesh_list[requests[r].mesh], "name"));
+        if (const Json* name = Document::find(mesh_list[requests[r].mesh], "name"); name && name->is_string())
+            meshes[r].name = name->get<std::string>();
     });
     report(doc, requests, layouts, jobs, repairs);
     return meshes;

@@ -41,9 +41,9 @@ struct Primitive {
 
 /// A mesh as one or several nodes need it: the same request gives the same Mesh.
 struct MeshRequest {
-    std::uint32_t mesh = 0;          ///< glTF mesh
-    std::vector<float> weights;      ///< of morph targets; empty: not morphed
-    std::int32_t skin = kNone;       ///< glTF skin; the vertices end up in world space
+    std::uint32_t mesh = 0;                ///< glTF mesh
+    std::vector<float> weights;            ///< of morph targets; empty: not morphed
+    std::int32_t skin = kNone;             ///< glTF skin; the vertices end up in world space
     std::vector<Affine3d> world_from_bind; ///< by joint
 
     [[nodiscard]] bool same_as(const MeshRequest& other) const {
@@ -92,8 +92,8 @@ struct VertexFaults {
 /// decoded, morphed, skinned, unit length. Attribute arrays of the mesh that are empty are
 /// skipped; those that the primitive lacks become white, zero, an arbitrary tangent or a NaN
 /// normal.
-VertexFaults fill_vertices(const Primitive& primitive, const MeshRequest& request, std::size_t base,
-                           std::size_t first, std::size_t count, Mesh& mesh);
+VertexFaults fill_vertices(const Primitive& primitive, const MeshRequest& request, std::size_t base, std::size_t first,
+                           std::size_t count, Mesh& mesh);
 
 struct BadIndices {
     std::uint64_t triangles = 0;

@@ -27,8 +27,8 @@ std::span<const std::byte> range_of(const Document& doc, const Json& json, std::
     const std::uint64_t offset = doc.uint_or(json, "byteOffset", 0);
     const std::uint64_t length = doc.need_uint(json, "byteLength");
     if (length == 0) doc.fail("E0303", json, "byteLength", "is 0, expected at least 1");
-    const std::uint64_t size =
-        buffer.undefined ? doc.need_uint(doc.list(doc.root(), "buffers")[index], "byteLength") : buffer.bytes.data.size();
+    const std::uint64_t size = buffer.undefined ? doc.need_uint(doc.list(doc.root(), "buffers")[index], "byteLength")
+                                                : buffer.bytes.data.size();
     if (offset > size || length > size - offset)
         doc.fail("E0301", json, offset > size ? "byteOffset" : "byteLength",
                  "the view ends at byte " + std::to_string(offset + length) + " of " + std::to_string(size) +
@@ -41,7 +41,9 @@ std::span<const std::byte> range_of(const Document& doc, const Json& json, std::
 // The codecs' own limits, and the most that the bytes at hand can unfold to, so that nothing
 // is allocated on the word of a number in the file.
 void check_form(const Document& doc, const Compressed& c) {
-    const auto refuse = [&](std::string_view below, const std::string& reason) { doc.fail("E0303", *c.json, below, reason); };
+    const auto refuse = [&](std::string_view below, const std::string& reason) {
+        doc.fail("E0303", *c.json, below, reason);
+    };
     std::uint64_t most = 0;
     if (c.mode == Compressed::Mode::attributes) {
         if (c.stride == 0 || c.stride > 256 || c.stride % 4 != 0)
@@ -49,13 +51,15 @@ void check_form(const Document& doc, const Compressed& c) {
         // A byte of header covers four groups of 16 values of one byte column.
         most = (c.bytes.size() * 64 / c.stride + 1) * c.stride + 256 * c.stride;
     } else {
-        if (c.stride != 2 && c.stride != 4) refuse("byteStride", "is " + std::to_string(c.stride) + ", expected 2 or 4");
+        if (c.stride != 2 && c.stride != 4)
+            refuse("byteStride", "is " + std::to_string(c.stride) + ", expected 2 or 4");
         if (c.mode == Compressed::Mode::triangles && c.count % 3 != 0)
             refuse("count", "is " + std::to_string(c.count) + ", not a multiple of 3");
         most = c.bytes.size() * 3 * c.stride;
     }
     using Filter = Compressed::Filter;
-    if (c.filter != Filter::none && c.mode != Compressed::Mode::attributes) refuse("filter", "is for mode ATTRIBUTES only");
+    if (c.filter != Filter::none && c.mode != Compressed::Mode::attributes)
+        refuse("filter", "is for mode ATTRIBUTES only");
     if ((c.filter == Filter::octahedral && c.stride != 4 && c.stride != 8) ||
         (c.filter == Filter::quaternion && c.stride != 8))
         refuse("filter", "does not fit a byteStride of " + std::to_string(c.stride));
@@ -74,16 +78,24 @@ Compressed read_form(const Document& doc, const Json& json, std::span<const Buff
     c.stride = doc.need_uint(json, "byteStride");
 
     const std::string_view mode = doc.string_or(json, "mode");
-    if (mode == "ATTRIBUTES") c.mode = Compressed::Mode::attributes;
-    else if (mode == "TRIANGLES") c.mode = Compressed::Mode::triangles;
-    else if (mode == "INDICES") c.mode = Compressed::Mode::indices;
-    else doc.fail("E0303", json, "mode", "is \"" + shortened(mode) + "\", expected ATTRIBUTES, TRIANGLES or INDICES");
+    if (mode == "ATTRIBUTES")
+        c.mode = Compressed::Mode::attributes;
+    else if (mode == "TRIANGLES")
+        c.mode = Compressed::Mode::triangles;
+    else if (mode == "INDICES")
+        c.mode = Compressed::Mode::indices;
+    else
+        doc.fail("E0303", json, "mode", "is \"" + shortened(mode) + "\", expected ATTRIBUTES, TRIANGLES or INDICES");
 
     const std::string_view filter = doc.string_or(json, "filter", "NONE");
-    if (filter == "NONE") c.filter = Compressed::Filter::none;
-    else if (filter == "OCTAHEDRAL") c.filter = Compressed::Filter::octahedral;
-    else if (filter == "QUATERNION") c.filter = Compressed::Filter::quaternion;
-    else if (filter == "EXPONENTIAL") c.filter = Compressed::Filter::exponential;
+    if (filter == "NONE")
+        c.filter = Compressed::Filter::none;
+    else if (filter == "OCTAHEDRAL")
+        c.filter = Compressed::Filter::octahedral;
+    else if (filter == "QUATERNION")
+        c.filter = Compressed::Filter::quaternion;
+    else if (filter == "EXPONENTIAL")
+        c.filter = Compressed::Filter::exponential;
     else
         doc.fail("E0303", json, "filter",
                  "is \"" + shortened(filter) + "\", expected NONE, OCTAHEDRAL, QUATERNION or EXPONENTIAL");
@@ -118,8 +130,8 @@ bool decode(Compressed& c) {
 
 } // namespace
 
-std::vector<BufferView> read_buffer_views(const Document& doc, std::span<const Buffer> buffers,
-                                          std::uint64_t max_bytes, const Control& control) {
+std::vector<BufferView> read_buffer_views(const Document& doc, std::span<const Buffer> buffers, std::uint64_t max_bytes,
+                                          const Control& control) {
     const std::span<const Json> list = doc.list_of_objects(doc.root(), "bufferViews");
     std::vector<BufferView> views(list.size());
     std::vector<Compressed> compressed;
@@ -140,7 +152,8 @@ std::vector<BufferView> read_buffer_views(const Document& doc, std::span<const B
         Compressed c = read_form(doc, *meshopt, buffers, i);
         total += c.count * c.stride;
         if (total > max_bytes)
-            doc.fail_limit(*meshopt, "count", "decoding takes more than the allowed " + std::to_string(max_bytes) + " bytes");
+            doc.fail_limit(*meshopt, "count",
+                           "decoding takes more than the allowed " + std::to_string(max_bytes) + " bytes");
         compressed.push_back(std::move(c));
     }
 
@@ -152,7 +165,9 @@ std::vector<BufferView> read_buffer_views(const Document& doc, std::span<const B
     });
     for (std::size_t i = 0; i < compressed.size(); ++i) {
         const Compressed& c = compressed[i];
-        if (!good[i]) doc.fail("E0308", *c.json, {}, "the meshopt data cannot be decoded; the file is damaged, or of a newer codec version?");
+        if (!good[i])
+            doc.fail("E0308", *c.json, {},
+                     "the meshopt data cannot be decoded; the file is damaged, or of a newer codec version?");
         BufferView& view = views[c.view];
         view.bytes = {*c.decoded, c.decoded};
         view.length = c.decoded->size();

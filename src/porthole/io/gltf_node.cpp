@@ -25,7 +25,8 @@ void read_transform(Document& doc, Node& node) {
         if (!(length > 0) || !std::isfinite(length))
             doc.warn("W0305", json, "rotation", "the quaternion has no length; the node is not rotated");
         else if (std::abs(length - 1) > 0.01)
-            doc.warn("W0305", json, "rotation", "the quaternion has length " + std::to_string(length) + ", expected 1; normalised");
+            doc.warn("W0305", json, "rotation",
+                     "the quaternion has length " + std::to_string(length) + ", expected 1; normalised");
     }
 }
 
@@ -36,7 +37,8 @@ std::int32_t optional_index(Document& doc, const Json& object, std::string_view 
     if (!index) return kNone;
     if (*index < size) return static_cast<std::int32_t>(*index);
     doc.warn("W0306", object, key,
-             "refers to " + std::string(what) + " " + std::to_string(*index) + " of " + std::to_string(size) + "; ignored");
+             "refers to " + std::string(what) + " " + std::to_string(*index) + " of " + std::to_string(size) +
+                 "; ignored");
     return kNone;
 }
 
@@ -45,7 +47,8 @@ Node read_node(Document& doc, const Json& json, std::size_t node_count) {
     Node node;
     node.json = &json;
     read_transform(doc, node);
-    if (const auto mesh = doc.index(json, "mesh", count("meshes"), "mesh")) node.mesh = static_cast<std::int32_t>(*mesh);
+    if (const auto mesh = doc.index(json, "mesh", count("meshes"), "mesh"))
+        node.mesh = static_cast<std::int32_t>(*mesh);
     if (const auto skin = doc.index(json, "skin", count("skins"), "skin")) node.skin = static_cast<std::int32_t>(*skin);
     node.camera = optional_index(doc, json, "camera", count("cameras"), "camera");
     if (const Json* use = doc.extension(json, "KHR_lights_punctual")) {
@@ -54,7 +57,8 @@ Node read_node(Document& doc, const Json& json, std::size_t node_count) {
     }
     if (const Json* visibility = doc.extension(json, "KHR_node_visibility"))
         node.visible = doc.bool_or(*visibility, "visible", true);
-    for (const Json& child : doc.list(json, "children")) node.children.push_back(doc.as_index(child, node_count, "node"));
+    for (const Json& child : doc.list(json, "children"))
+        node.children.push_back(doc.as_index(child, node_count, "node"));
     for (const Json& weight : doc.list(json, "weights")) {
         if (!weight.is_number()) doc.fail("E0303", weight, {}, "is not a number");
         node.weights.push_back(static_cast<float>(weight.get<double>()));
@@ -151,7 +155,8 @@ std::vector<std::uint32_t> scene_roots(Document& doc, std::span<const Node> node
         bool covered = false;
         for (std::int32_t k = nodes[i].parent; k != kNone && !covered; k = nodes[std::size_t(k)].parent)
             covered = listed[std::size_t(k)] != 0;
-        doc.warn("W0305", scenes[scene], "nodes", "node " + std::to_string(i) + " is no root; it has the parent " + std::to_string(nodes[i].parent));
+        doc.warn("W0305", scenes[scene], "nodes",
+                 "node " + std::to_string(i) + " is no root; it has the parent " + std::to_string(nodes[i].parent));
         return covered;
     });
     return roots;
@@ -197,13 +202,16 @@ std::vector<Affine3d> read_instances(const Document& doc, std::span<const Access
         if (translation) read_floats(*translation, i, 1, 3, t);
         if (rotation) read_floats(*rotation, i, 1, 4, r);
         if (scale) read_floats(*scale, i, 1, 3, s);
-        instances.push_back(compose({t[0], t[1], t[2]}, normalize(Quaternion{r[0], r[1], r[2], r[3]}), {s[0], s[1], s[2]}));
+        instances.push_back(
+            compose({t[0], t[1], t[2]}, normalize(Quaternion{r[0], r[1], r[2], r[3]}), {s[0], s[1], s[2]}));
     }
     return instances;
 }
 
 std::string name_of(Document& doc, const Json& json) {
-    std::string name(doc.string_or(json, "name"));
+    const Json* value = Document::find(json, "name");
+    if (!value || !value->is_string()) return {}; // check_names has warned
+    std::string name = value->get<std::string>();
     if (name.find('\0') == name.npos) return name;
     doc.warn("W0310", json, "name", "has a NUL character; it is read as U+FFFD");
     std::string clean;

@@ -21,11 +21,11 @@ struct Node {
     std::int32_t parent = kNone;
     std::vector<std::uint32_t> children;
     std::int32_t mesh = kNone, skin = kNone, camera = kNone, light = kNone; ///< glTF indices
-    bool visible = true; ///< KHR_node_visibility, this node's own
+    bool visible = true;                                                    ///< KHR_node_visibility, this node's own
     bool has_matrix = false;
     Affine3d matrix; ///< if has_matrix; else the three below
     Vec3d translation{0, 0, 0}, scale{1, 1, 1};
-    Quaternion rotation; ///< unit length
+    Quaternion rotation;        ///< unit length
     std::vector<float> weights; ///< of morph targets; empty: the mesh's
 
     [[nodiscard]] Affine3d parent_from_node() const;
@@ -42,8 +42,7 @@ struct Node {
 
 /// Nodes that have no parent, then their children and so on: parents before children, siblings
 /// in order (depth first).
-[[nodiscard]] std::vector<std::uint32_t> depth_first(std::span<const Node> nodes,
-                                                     std::span<const std::uint32_t> roots);
+[[nodiscard]] std::vector<std::uint32_t> depth_first(std::span<const Node> nodes, std::span<const std::uint32_t> roots);
 
 /// The nodes that the default scene lists, or all without a parent when there is no scene.
 /// @throws Error E0306 for a scene or node that does not exist.

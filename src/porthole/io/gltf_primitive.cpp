@@ -67,7 +67,8 @@ void drop_unequal(Document& doc, const Json& json, Attributes& a, std::uint64_t 
         drop_unequal(doc, json, a.joints[n], vertices, "JOINTS");
         drop_unequal(doc, json, a.weights[n], vertices, "WEIGHTS");
     }
-    if (std::count(a.joints.begin(), a.joints.end(), nullptr) + std::count(a.weights.begin(), a.weights.end(), nullptr)) {
+    if (std::count(a.joints.begin(), a.joints.end(), nullptr) +
+        std::count(a.weights.begin(), a.weights.end(), nullptr)) {
         a.joints.clear();
         a.weights.clear();
     }
@@ -87,9 +88,13 @@ std::vector<Primitive> read_primitives(Document& doc, std::span<const Accessor> 
         Primitive& p = primitives.emplace_back();
         p.json = &json;
         switch (const std::uint64_t mode = doc.uint_or(json, "mode", 4)) {
-        case 0: case 1: case 2: case 3:
+        case 0:
+        case 1:
+        case 2:
+        case 3:
             p.topology = Topology::none;
-            doc.warn("W0302", json, {}, std::string("draws ") + (mode == 0 ? "points" : "lines") + ", which are left out");
+            doc.warn("W0302", json, {},
+                     std::string("draws ") + (mode == 0 ? "points" : "lines") + ", which are left out");
             continue;
         case 4: p.topology = Topology::triangles; break;
         case 5: p.topology = Topology::strip; break;
@@ -108,7 +113,8 @@ std::vector<Primitive> read_primitives(Document& doc, std::span<const Accessor> 
         p.indices = find_accessor(doc, accessors, json, "indices", {1});
         if (p.indices && !is_index_type(p.indices->component))
             doc.fail("E0303", *p.indices->json, "componentType",
-                     "is " + std::to_string(unsigned(p.indices->component)) + ", but indices must be 5121, 5123 or 5125");
+                     "is " + std::to_string(unsigned(p.indices->component)) +
+                         ", but indices must be 5121, 5123 or 5125");
     }
     return primitives;
 }
@@ -125,7 +131,8 @@ void settle_counts(Document& doc, Primitive& p) {
     if (p.topology == Topology::triangles) {
         p.triangles = p.corners / 3;
         if (p.corners % 3 != 0)
-            doc.warn("W0301", *p.json, {}, std::to_string(p.corners) + " corners are no whole number of triangles; the rest is left out");
+            doc.warn("W0301", *p.json, {},
+                     std::to_string(p.corners) + " corners are no whole number of triangles; the rest is left out");
     } else {
         p.triangles = p.corners < 3 ? 0 : p.corners - 2;
     }

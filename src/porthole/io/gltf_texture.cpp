@@ -16,7 +16,8 @@ Wrap wrap_of(Document& doc, const Json& sampler, std::string_view key) {
     case 33071: return Wrap::clamp;
     case 33648: return Wrap::mirror;
     default:
-        doc.warn("W0303", sampler, key, "is " + std::to_string(code) + ", expected 10497, 33071 or 33648; 10497 (repeat) is used");
+        doc.warn("W0303", sampler, key,
+                 "is " + std::to_string(code) + ", expected 10497, 33071 or 33648; 10497 (repeat) is used");
         return Wrap::repeat;
     }
 }
@@ -47,7 +48,8 @@ TextureRef TextureReader::read(const Json& object, std::string_view key) {
     std::uint64_t uv_set = doc_.uint_or(*info, "texCoord", 0);
     read_transform(doc_, *info, uv_set, ref);
     if (uv_set > 1) {
-        doc_.warn("W0303", *info, "texCoord", "is " + std::to_string(uv_set) + ", only 0 and 1 are read; the texture is ignored");
+        doc_.warn("W0303", *info, "texCoord",
+                  "is " + std::to_string(uv_set) + ", only 0 and 1 are read; the texture is ignored");
         return {};
     }
     ref.uv_set = static_cast<std::uint8_t>(uv_set);
@@ -59,7 +61,8 @@ std::int32_t TextureReader::texture_of(const Json& info) {
     const std::span<const Json> list = doc_.list_of_objects(doc_.root(), "textures");
     const std::uint64_t index = doc_.need_uint(info, "index");
     if (index >= list.size()) {
-        doc_.warn("W0303", info, "index", "refers to texture " + std::to_string(index) + " of " + std::to_string(list.size()) + "; ignored");
+        doc_.warn("W0303", info, "index",
+                  "refers to texture " + std::to_string(index) + " of " + std::to_string(list.size()) + "; ignored");
         return kNone;
     }
     if (const auto known = texture_by_index_.find(index); known != texture_by_index_.end()) return known->second;
@@ -77,7 +80,9 @@ std::int32_t TextureReader::texture_of(const Json& info) {
             texture.wrap_v = wrap_of(doc_, s, "wrapT");
             texture.nearest = doc_.uint_or(s, "magFilter", 9729) == 9728;
         } else {
-            doc_.warn("W0303", json, "sampler", "refers to sampler " + std::to_string(*sampler) + " of " + std::to_string(samplers.size()) + "; ignored");
+            doc_.warn("W0303", json, "sampler",
+                      "refers to sampler " + std::to_string(*sampler) + " of " + std::to_string(samplers.size()) +
+                          "; ignored");
         }
     }
     textures_.push_back(texture);
@@ -98,7 +103,8 @@ std::int32_t TextureReader::image_of(const Json& texture) {
         return kNone; // else glTF leaves the image open
     }
     if (*source >= list.size()) {
-        doc_.warn("W0304", texture, {}, "refers to image " + std::to_string(*source) + " of " + std::to_string(list.size()) + "; ignored");
+        doc_.warn("W0304", texture, {},
+                  "refers to image " + std::to_string(*source) + " of " + std::to_string(list.size()) + "; ignored");
         return kNone;
     }
     const auto [known, fresh] = image_by_index_.try_emplace(*source, static_cast<std::int32_t>(images_.size()));
@@ -174,7 +180,8 @@ std::vector<Image<Rgba8>> TextureReader::decode_images(const LoadParams& params,
     for (std::size_t k = 0; k < kept.size(); ++k) {
         const std::size_t i = kept[k];
         for (const Warning& w : warnings[k]) doc_.warn(w.code.c_str(), *images_[i], {}, w.reason);
-        if (!problem[i].empty()) doc_.warn("W0304", *images_[i], {}, problem[i] + "; the material's plain colour is used");
+        if (!problem[i].empty())
+            doc_.warn("W0304", *images_[i], {}, problem[i] + "; the material's plain colour is used");
     }
     return images;
 }

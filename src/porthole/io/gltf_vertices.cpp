@@ -14,9 +14,8 @@ static_assert(sizeof(Vec2f) == 8 && sizeof(Vec3f) == 12 && sizeof(Vec4f) == 16 &
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 // Adds weight * difference of every morph target that has the attribute `pick` chooses.
-template <typename Pick>
-void add_targets(const Primitive& p, const MeshRequest& request, std::size_t first, std::size_t count, int width,
-                 int stride, float* out, const Pick& pick) {
+template <typename Pick> void add_targets(const Primitive& p, const MeshRequest& request, std::size_t first,
+                                          std::size_t count, int width, int stride, float* out, const Pick& pick) {
     std::vector<float> difference;
     for (std::size_t t = 0; t < p.targets.size() && t < request.weights.size(); ++t) {
         const Accessor* accessor = pick(p.targets[t]);
@@ -26,7 +25,8 @@ void add_targets(const Primitive& p, const MeshRequest& request, std::size_t fir
         read_floats(*accessor, first, count, width, difference.data());
         for (std::size_t i = 0; i < count; ++i)
             for (int k = 0; k < width; ++k)
-                out[i * std::size_t(stride) + std::size_t(k)] += weight * difference[i * std::size_t(width) + std::size_t(k)];
+                out[i * std::size_t(stride) + std::size_t(k)] +=
+                    weight * difference[i * std::size_t(width) + std::size_t(k)];
     }
 }
 
@@ -107,7 +107,8 @@ void normalize_tangents(Vec4f* tangents, const Vec3f* normals, std::size_t count
 class Corners {
 public:
     Corners(const Primitive& p, std::size_t first, std::size_t count) : first_(first), values_(count) {
-        if (p.indices) read_uints(*p.indices, first, count, values_.data());
+        if (p.indices)
+            read_uints(*p.indices, first, count, values_.data());
         else
             for (std::size_t i = 0; i < count; ++i) values_[i] = static_cast<std::uint32_t>(first + i);
     }
@@ -173,7 +174,8 @@ BadIndices fill_triangles(const Primitive& p, std::uint32_t base, std::size_t fi
     std::uint32_t largest = 0;
     if (p.topology == Topology::triangles) {
         std::uint32_t* flat = &out->x;
-        if (p.indices) read_uints(*p.indices, first * 3, count * 3, flat);
+        if (p.indices)
+            read_uints(*p.indices, first * 3, count * 3, flat);
         else
             for (std::size_t i = 0; i < count * 3; ++i) flat[i] = static_cast<std::uint32_t>(first * 3 + i);
         for (std::size_t i = 0; i < count * 3; ++i) largest = std::max(largest, flat[i]);
@@ -251,7 +253,8 @@ void repair_normals(Mesh& mesh) {
         sum[t.z] += n;
     }
     for (std::size_t v = 0; v < vertices; ++v)
-        if (missing(static_cast<std::uint32_t>(v))) mesh.normals[v] = normalize(Vec3f(normalize(sum[v], Vec3d{0, 0, 1})));
+        if (missing(static_cast<std::uint32_t>(v)))
+            mesh.normals[v] = normalize(Vec3f(normalize(sum[v], Vec3d{0, 0, 1})));
 }
 
 } // namespace porthole::gltf
