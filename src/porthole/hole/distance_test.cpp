@@ -116,10 +116,9 @@ TEST(PowerDistanceTransform, HeavyAndFarSitesStayExact) {
     // 16384 pixels across with the greatest weights that the hole uses.
     const Rect window{0, 0, 16384, 2};
     std::mt19937 random(4);
-    std::vector<PowerSite> sites;
-    for (int i = 0; i < 200; ++i)
-        sites.push_back(
-            {{pick(random, 16384), pick(random, 2)}, std::int64_t(36) * 4096 * 4096 - pick(random, 100000)});
+    std::vector<PowerSite> sites(200);
+    for (PowerSite& s : sites)
+        s = {{pick(random, 16384), pick(random, 2)}, std::int64_t(36) * 4096 * 4096 - pick(random, 100000)};
     const PowerDistance found = power_distance_transform(window, sites, 36);
     for (std::int32_t x = 0; x < 16384; x += 13)
         for (std::int32_t y = 0; y < 2; ++y) {

@@ -1,8 +1,7 @@
 #include "porthole/hole/floor.h"
 
 #include <algorithm>
-#include <numeric>
-
+#include <vector>
 
 namespace porthole {
 namespace {

@@ -1,9 +1,6 @@
 // Smoothing of the floor depth over the band.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "porthole/base/ids.h"
 
 namespace porthole {

@@ -205,8 +205,8 @@ Hole grow_hole(std::span<const Contour> contours, const IdBuffer& targets, const
     const Rect box = bounds_of(pixels).grown(params.depth_px + int(kRimReach) + 1).intersected(hole.window);
     draw_discs(hole, targets, sites, pixels.empty() ? Rect{} : box, params.depth_px);
     if (any_band)
-        hole.floor_depth = blur_floor(std::move(hole.floor_depth), hole.mask, targets.id, box,
-                                      int(std::lround(params.blur_px)), 2);
+        hole.floor_depth =
+            blur_floor(std::move(hole.floor_depth), hole.mask, targets.id, box, int(std::lround(params.blur_px)), 2);
     return hole;
 }
 

@@ -56,8 +56,8 @@ struct Hole {
 /// band's width there (the paper's k <= d/2, at every pixel).
 ///
 /// The floor depth of a band pixel is the target depth at the contour pixel whose disc owns it
-/// (the nearest in the power sense), then box-blurred twice with radius params.blur_px, reading targets
-/// and band, writing outside the targets.
+/// (the nearest in the power sense; the leftmost, then the topmost of several), then box-blurred
+/// twice with radius params.blur_px, reading targets and band, writing outside the targets.
 ///
 /// The signed distance is made for bilinear interpolation at the rim. In the band and outside
 /// it is the distance to the circle of the disc that is nearest in the power sense: smooth,
@@ -73,7 +73,7 @@ struct Hole {
 /// @return the hole in the same window; empty() if no target is in view.
 /// @throws Error usage E0120 if windows differ, a contour pixel is not a target's, or a parameter
 ///         is out of range.
-/// Cost: linear in the window's pixels plus contour length times depth. Safe concurrently.
+/// Cost: linear in the window's pixels, whatever the depth. Safe to call concurrently.
 /// Source: Dandachy et al., N_k, P_k, F_k and d. Differs: the paper steps along three of eight
 /// directions, wider on diagonals and with gaps; this is an exact power distance transform,
 /// clamped at every pixel, not once.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <set>
 
 #include "porthole/base/error.h"
 #include "porthole/hole/distance.h"
@@ -51,9 +52,8 @@ Case random_case(Rect window, std::mt19937& random) {
     return c;
 }
 
-/// 9 |p-c|^2 <= min(9 depth^2, D^2(c)), for each covered contour pixel c.
-/// 9 |p-c|^2 - min(9 depth^2, D^2(c)): the disc covers p where it is not positive. kFar for
-/// pixels that grow no band.
+/// 9 |p-c|^2 - min(9 depth^2, D^2(c)): the disc of contour pixel c covers p where this is not
+/// positive. kFar for pixels that grow no band.
 std::int64_t disc_power(const Case& c, const Image<std::int64_t>& to_outside, const BandPixel& b, Vec2i p) {
     const std::int64_t depth2 = 9 * std::int64_t(c.params.depth_px) * c.params.depth_px;
     return b.covered ? 9 * distance2(p, b.pixel) - std::min(depth2, to_outside(b.pixel.x, b.pixel.y)) : kFar;
@@ -136,9 +136,13 @@ TEST(GrowHole, IsTheTargetsAndTheDiscsExactly) {
                 ASSERT_EQ(hole.mask(x, y), inside) << x << ' ' << y << " round " << round;
                 // The floor is the targets' own depth, then the owner's, and nowhere else.
                 const float floor = hole.floor_depth(x, y);
-                if (target) ASSERT_EQ(floor, c.targets.depth(x, y));
-                else if (inside) ASSERT_TRUE(owners.contains(floor)) << x << ' ' << y << " round " << round;
-                else ASSERT_EQ(floor, kInfinity);
+                if (target) {
+                    ASSERT_EQ(floor, c.targets.depth(x, y));
+                } else if (inside) {
+                    ASSERT_TRUE(owners.contains(floor)) << x << ' ' << y << " round " << round;
+                } else {
+                    ASSERT_EQ(floor, kInfinity);
+                }
                 ASSERT_EQ(hole.distance(x, y) <= 0, inside) << x << ' ' << y << " round " << round;
                 ASSERT_LE(hole.distance(x, y), kRimReach);
                 // Inside E, or a target's own pixel.
