@@ -40,7 +40,8 @@ struct Pixel {
         in_hole = 2,   ///< its sample obeys the cut
         on_target = 4, ///< and sees an opened target
         may_open = 8,  ///< some sample of the pixel may be in the hole
-        rim = 16       ///< the rim may pass through the pixel: every sample is needed
+        rim = 16,      ///< the rim may pass through the pixel: every sample is needed
+        on_rim = 32    ///< its sample lies on the line along the rim
     };
     std::uint32_t triangle = 0;
     float u = 0, v = 0;

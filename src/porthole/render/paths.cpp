@@ -6,7 +6,7 @@ namespace porthole {
 
 namespace {
 
-/// Rays that can change no pixel by more than about a step of 8 bits are dropped.
+/// Rays that carry less are dropped: what they would add is hard to see.
 constexpr float kLeastWeight = 0.02f;
 
 float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
@@ -27,11 +27,33 @@ bool bends(const Material& m, const Placement& placement) {
 }
 
 /// The colour that light takes on where it passes the surface. Of a blended body alpha says
-/// how strong it is.
+/// how strong it is: such bodies are drawn as two blended sheets elsewhere.
 Vec3f surface_tint(const Substance& s, bool body) {
     const Vec3f color{clamp01(s.color.x), clamp01(s.color.y), clamp01(s.color.z)};
     if (!body) return color;
-    return root(lerp(Vec3f{1, 1, 1}, color, s.coverage)); // once on the way in, once out
+    return root(lerp(Vec3f{1, 1, 1}, color, std::sqrt(s.coverage))); // once on the way in, once out
+}
+
+/// Frosted glass spreads a camera ray into this many.
+constexpr int kSpread = 16;
+constexpr float kFrosted = 0.1f; ///< roughness from which glass is frosted
+
+float least_weight(const PathRay& ray) { return ray.spread ? kLeastWeight / kSpread : kLeastWeight; }
+
+/// Whether glass blurs what is behind it. A roughness of 1 without a texture is what glTF
+/// says when the file says nothing: such glass is drawn clear, or nothing would be seen.
+bool is_frosted(const Substance& s) {
+    const Material& m = *s.material;
+    return s.roughness > kFrosted && (m.roughness < 1.0f || m.metallic_roughness_texture.texture >= 0);
+}
+
+/// Facet normal `i` of `n` of a GGX surface.
+Vec3f facet_normal(Vec3f normal, float alpha, int i, int n) {
+    const Vec2f d = disc_point(i, n); // evenly spread in area: radius squared is uniform
+    const float u = std::min(dot(d, d), 0.98f);
+    const float tan2 = alpha * alpha * u / (1.0f - u);
+    const float r = std::sqrt(tan2 / std::max(u, 1e-6f));
+    return normalize(Frame3(normal).world_from_local({d.x * r, d.y * r, 1.0f}), normal);
 }
 
 } // namespace
@@ -53,7 +75,7 @@ Vec4f display_color(const Radiance& r, Vec3f background) {
 }
 
 void Shader::push(const PathRay& ray) {
-    if (largest(ray.weight) < kLeastWeight) return;
+    if (largest(ray.weight) < least_weight(ray)) return;
     if (ray.bounce <= stage_->params.max_bounces) queue_.push_back(ray);
     else end_in_surroundings(ray); // where it would have gone on: bright rather than black
 }
@@ -101,7 +123,7 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
         next.weight = weight * shaded.mirror;
         next.roughness = s.roughness;
         next.through = false;
-        if (largest(next.weight) < kLeastWeight) end_in_surroundings(next);
+        if (largest(next.weight) < least_weight(next)) end_in_surroundings(next);
         else push(next);
         next = ray;
         ++next.bounce;
@@ -121,9 +143,25 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
     PathRay next = ray;
     ++next.bounce;
     next.origin = point.beyond;
+    // Only the first surface spreads the ray: one blur stands for both sides.
+    const int spread = !ray.spread && ray.through && is_frosted(s) ? kSpread : 1;
+    next.spread |= spread > 1;
+    const auto facet = [&](int i) {
+        if (spread == 1) return normal;
+        const int n = kSpread * kCellPixels;
+        return facet_normal(normal, s.roughness * s.roughness, i * kCellPixels + ray.pattern % kCellPixels, n);
+    };
     if (!body) {
-        next.weight = weight * surface_tint(s, false) * (1.0f - fresnel_dielectric(cosine, std::max(1.0f, s.material->ior)));
-        push(next);
+        const float mirrored = fresnel_dielectric(cosine, std::max(1.0f, s.material->ior));
+        next.weight = weight * surface_tint(s, false) * ((1.0f - mirrored) / float(spread));
+        for (int i = 0; i < spread; ++i) {
+            // A sheet sends on what its facets would mirror, to the other side.
+            if (spread > 1) {
+                const Vec3f r = reflect(ray.direction, facet(i));
+                next.direction = r - normal * (2.0f * std::max(0.0f, dot(r, normal)));
+            }
+            push(next);
+        }
         return;
     }
     const auto material = std::int32_t(s.material - scene.materials.data());
@@ -136,9 +174,9 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
     const float eta = ior(next.media) / ior(ray.media);
     const float mirrored = fresnel_dielectric(cosine, eta);
     const auto direction = refract(ray.direction, normal, eta);
-    if (direction) {
-        next.direction = *direction;
-        next.weight = weight * surface_tint(s, true) * (1.0f - mirrored);
+    next.weight = weight * surface_tint(s, true) * ((1.0f - mirrored) / float(spread));
+    for (int i = 0; i < spread && direction; ++i) {
+        next.direction = refract(ray.direction, facet(i), eta).value_or(*direction);
         push(next);
     }
     if (point.front) return; // the outside's mirror image is in shade()
@@ -189,14 +227,15 @@ void Shader::trace_newest() {
         }
         const std::int32_t medium = ray.media.innermost();
         if (medium != kNone) ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);
-        if (largest(ray.weight) < kLeastWeight) continue;
+        if (largest(ray.weight) < least_weight(ray)) continue;
         const Hit hit{from.part(i), from.triangle[i], from.u[i], from.v[i]};
         const Placement& placement = stage.placements[index(hit.part)];
         const SurfacePoint point = surface_point(placement, hit, ray.direction);
         const Material& m = stage.scene.materials[placement.mesh->material_of(hit.triangle)];
         Reach reach;
-        const bool clear_inside = !point.front && m.transmission > 0.99f && bends(m, placement);
-        if (!m.unlit && !clear_inside)
+        // Clear glass has no matte layer that shadows could fall on.
+        const bool clear = m.transmission > 0.99f && m.transmission_texture.texture < 0;
+        if (!m.unlit && !clear)
             reach = stage.occlusion.reach({point.position, point.start, point.flat_normal, point.normal, ray.in_hole, 0}, *rays_);
         add(ray, hit, point, reach, false);
     }

@@ -57,18 +57,30 @@ float borrow_ambient(const GBuffer& buffer, std::uint32_t key, Vec3f normal, flo
     return -1.0f;
 }
 
-PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole) {
+PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole, int pattern) {
     PathRay ray;
+    ray.pattern = pattern;
     ray.direction = direction;
     ray.slot = slot;
     ray.in_hole = in_hole;
     return ray;
 }
 
+/// The dark line along the rim, over whatever is there, background too.
+Vec4f rim_line(Vec4f c) {
+    constexpr float kBrightness = 0.25f;
+    return {c.x * kBrightness, c.y * kBrightness, c.z * kBrightness, 1.0f - (1.0f - c.w) * kBrightness};
+}
+
+/// What a pixel knows from its samples beyond the first.
+struct LaneState {
+    bool in_hole = false;
+    std::uint32_t on_rim = 0; ///< bit by sample of the group
+};
+
 /// Sample `s` of up to sixteen pixels, into slots group_index * 16 + lane of the shader.
 void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> pixels, int s, int group_index,
-                   Shader& shader,
-                   std::array<bool, kLanes>& in_hole, RayCounts& rays) {
+                   Shader& shader, std::array<LaneState, kLanes>& state, RayCounts& rays) {
     const GBuffer& buffer = picture.buffer;
     const Vec2f at = pixel_sample(s);
     Samples16 samples;
@@ -87,7 +99,8 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
     std::size_t n = 0;
     const std::uint32_t first = std::uint32_t(group_index) * kLanes;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
-        in_hole[i] = in_hole[i] || seen.in_hole[i];
+        state[i].in_hole |= seen.in_hole[i];
+        if (seen.on_rim[i]) state[i].on_rim |= 1u << group_index;
         const Hit& hit = seen.hit[i];
         if (!hit.any()) {
             shader.miss(first + std::uint32_t(i));
@@ -98,7 +111,7 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
         // Each sample of a pixel looks at another part of the lamps.
         const int pattern = cell_rank(pixels[i].x, pixels[i].y) + s * 5;
         if (flat) {
-            shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i]), hit, p, {}, seen.on_target[i]);
+            shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], pattern), hit, p, {}, seen.on_target[i]);
             continue;
         }
         askers[n] = {p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern};
@@ -112,7 +125,7 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
     for (std::size_t k = 0; k < n; ++k) {
         const std::size_t i = lane_of[k];
         const Reach reach = ambient[k] >= 0 ? Reach{lamps[k], ambient[k]} : stage.occlusion.reach(askers[k], rays);
-        shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i]), seen.hit[i], surface[i], reach,
+        shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], askers[k].pattern), seen.hit[i], surface[i], reach,
                    seen.on_target[i]);
     }
 }
@@ -141,7 +154,7 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
             const SurfacePoint point = surface_point(stage.placements[index(hit.part)], hit, direction);
             const Reach reach = flat ? Reach{} : filtered.reach(x, y);
             buffer.ambient(x, y) = std::uint16_t(std::lround(clamp01(reach.ambient) * 65535.0f));
-            shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole)), hit, point, reach,
+            shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole), cell_rank(x, y)), hit, point, reach,
                        pixel.has(Pixel::on_target));
         }
     shader.finish();
@@ -149,7 +162,8 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
         for (int x = tile.x0; x < tile.x1; ++x) {
             const Pixel& pixel = buffer.pixels(x, y);
             if (!pixel.has(Pixel::traced)) continue;
-            picture.color(x, y) = display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
+            const Vec4f c = display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
+            picture.color(x, y) = pixel.has(Pixel::on_rim) ? rim_line(c) : c;
             picture.opened(x, y) = pixel.has(Pixel::in_hole) ? 1 : 0;
         }
     picture.rays.add(rays);
@@ -188,24 +202,27 @@ void refine_tile(Picture& picture, const Stage& stage, Rect tile) {
     for (std::size_t begin = 0; begin < todo.size(); begin += kLanes) {
         const std::span<const Vec2i> pixels(todo.data() + begin, std::min<std::size_t>(kLanes, todo.size() - begin));
         std::array<Vec4f, kLanes> sum;
-        std::array<bool, kLanes> in_hole{};
+        std::array<LaneState, kLanes> state;
         for (std::size_t i = 0; i < pixels.size(); ++i) {
             sum[i] = picture.color(pixels[i].x, pixels[i].y);
-            in_hole[i] = picture.opened(pixels[i].x, pixels[i].y) != 0;
+            state[i].in_hole = picture.opened(pixels[i].x, pixels[i].y) != 0;
         }
         for (int s0 = 1; s0 < n; s0 += kGroup) {
             const int count = std::min(kGroup, n - s0);
             shader.clear();
-            for (int s = 0; s < count; ++s) trace_samples(picture, stage, pixels, s0 + s, s, shader, in_hole, rays);
+            for (LaneState& lane : state) lane.on_rim = 0;
+            for (int s = 0; s < count; ++s) trace_samples(picture, stage, pixels, s0 + s, s, shader, state, rays);
             shader.finish();
             for (int s = 0; s < count; ++s)
-                for (std::size_t i = 0; i < pixels.size(); ++i)
-                    sum[i] = sum[i] + display_color(shader.radiance(std::uint32_t(s) * kLanes + std::uint32_t(i)),
-                                                    picture.params.background);
+                for (std::size_t i = 0; i < pixels.size(); ++i) {
+                    const Vec4f c = display_color(shader.radiance(std::uint32_t(s) * kLanes + std::uint32_t(i)),
+                                                  picture.params.background);
+                    sum[i] = sum[i] + ((state[i].on_rim >> s & 1u) ? rim_line(c) : c);
+                }
         }
         for (std::size_t i = 0; i < pixels.size(); ++i) {
             picture.color(pixels[i].x, pixels[i].y) = sum[i] * (1.0f / float(n));
-            picture.opened(pixels[i].x, pixels[i].y) = in_hole[i] ? 1 : 0;
+            picture.opened(pixels[i].x, pixels[i].y) = state[i].in_hole ? 1 : 0;
         }
     }
     picture.rays.add(rays);

@@ -18,6 +18,7 @@ void check(const RenderParams& p) {
     in_range("samples", p.samples, 1, 4096);
     in_range("ao_samples", p.ao_samples, 0, 256);
     in_range("max_bounces", p.max_bounces, 0, 64);
+    if (!(p.rim_px >= 0) || !(p.rim_px <= 100)) throw Error(ErrorKind::usage, "E0130", "rim_px", "outside 0..100");
 }
 
 /// Runs one pass over all tiles and reports its share of the work.
@@ -70,7 +71,7 @@ Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderP
              const Frame* under, const Control& control) {
     check(params);
     if (!cut) {
-        const Camera camera(bvh, nullptr, view, nullptr);
+        const Camera camera(bvh, nullptr, view, nullptr, 0);
         Picture picture(view, params, camera, view.window());
         mark_everything(picture);
         draw(picture, bvh, nullptr, control);
@@ -81,7 +82,7 @@ Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderP
     frame.rays = {};
     const Rect window = cut->empty() ? Rect{} : hole_window(*cut, view);
     if (window.empty()) return frame;
-    const Camera camera(bvh, targets, view, cut);
+    const Camera camera(bvh, targets, view, cut, params.shading == Shading::flat ? 0.0f : params.rim_px);
     Picture picture(view, params, camera, window);
     mark_hole(picture, *cut);
     draw(picture, bvh, cut, control);

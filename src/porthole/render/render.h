@@ -24,6 +24,8 @@ struct RenderParams {
     int max_bounces = 6;   ///< reflections, refractions and blended surfaces along one path, [0, 64]
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
+    float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, [0, 100]; without it, shells of one
+                         ///< colour swallow the hole. Never on a target; none with flat shading
     Vec3f background{1, 1, 1}; ///< linear; seen, tinted, through coloured glass
     float target_radius = 0;   ///< of the targets' bounding sphere, metres: scales ambient occlusion inside the hole; 0: unknown
 };
