@@ -145,7 +145,15 @@ Cut make_cut(const Subject& subject, const View& view, const Hole& hole, const I
     for (std::size_t i = 0; i < hole.mask.pixels().size(); ++i)
         if (!hole.mask.pixels()[i]) cut.cut_depth.pixels()[i] = -kInfinity;
     cut.loose_depth = trace_farthest(cut_bvh, view, hole.mask, cut.cut_depth, control, &rays);
-    // The farthest removed point itself is gone; what lies behind it stays.
+
+    // Where nothing would be left to see, the last surface that was to go stays: no hole shows
+    // the background through the object, so the object keeps its outline.
+    const Mask left = trace_beyond(subject.whole, view, hole.mask, cut.cut_depth, control, &rays);
+    for (std::size_t i = 0; i < left.pixels().size(); ++i) {
+        if (left.pixels()[i] || !hole.mask.pixels()[i] || targets.id.pixels()[i] != kNoPart) continue;
+        const float last = cut.loose_depth.pixels()[i] * (1 - 1e-6f);
+        cut.cut_depth.pixels()[i] = cut.loose_depth.pixels()[i] = last;
+    }
     return cut;
 }
 

@@ -402,8 +402,9 @@ void intersect_cut(const Bvh& bvh, RayHit16& rays, int lane, const Cut* cut) {
             rays.instance[lane] = index(part);
             return;
         }
-        // Gone: look on behind it. The next representable t ends the loop even on stacked surfaces.
-        tnear = std::nextafter(one.ray.tfar, kInfinity);
+        // Gone: look on behind it. The next representable t ends the loop even on stacked
+        // surfaces; a denormal one would be flushed to zero and find the same hit again.
+        tnear = std::max(std::nextafter(one.ray.tfar, kInfinity), std::numeric_limits<float>::min());
     }
 }
 

@@ -320,6 +320,36 @@ Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask, 
     return farthest;
 }
 
+Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from,
+                  const Control& control, std::int64_t* rays) {
+    Mask beyond(mask.window(), 0);
+    std::atomic<std::int64_t> traced{0};
+    parallel_for_tiles(mask.window(), kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        std::int64_t n = 0;
+        for_each_block(tile, [&](int x0, int y0) {
+            set_block_rays(packet, depth_per_t, view, x0, y0, tile);
+            for (int i = 0; i < kLanes; ++i) {
+                if (!packet.active(i)) continue;
+                const int x = x0 + (i & 3), y = y0 + (i >> 2);
+                if (!mask(x, y) || !(from(x, y) < kInfinity)) {
+                    packet.clear(i);
+                    continue;
+                }
+                packet.tnear[i] = std::max(0.0f, from(x, y) / depth_per_t[i]);
+                ++n;
+            }
+            occluded_by_any(bvh, packet);
+            for (int i = 0; i < kLanes; ++i)
+                if (packet.tfar[i] == -kInfinity && packet.tnear[i] < kInfinity) beyond(x0 + (i & 3), y0 + (i >> 2)) = 1;
+        });
+        traced += n;
+    });
+    add(rays, traced);
+    return beyond;
+}
+
 FineCoverage trace_fine(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
     FineCoverage fine;
     fine.hits = Image<std::uint16_t>(window, 0);

@@ -75,6 +75,11 @@ struct Spans {
                                           const Image<float>& limit, const Control& control = {},
                                           std::int64_t* rays = nullptr);
 
+/// At the pixels of `mask` whether a ray meets any surface of `bvh` at depth `from` there or
+/// beyond; 0 outside the mask.
+[[nodiscard]] Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from,
+                                const Control& control = {}, std::int64_t* rays = nullptr);
+
 /// Hits of a target in the 16 sub-pixel positions (4x4 grid) of each pixel of `window`, for
 /// targets too small for pixel centres.
 struct FineCoverage {
