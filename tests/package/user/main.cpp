@@ -1,8 +1,11 @@
-// What a user of the installed library writes: reads a model and draws a small picture of it.
+// What a user of the installed library writes: reads a model and looks at a part inside it.
 #include <cstdio>
+#include <string>
+#include <vector>
 
 #include "porthole/io/load.h"
-#include "porthole/render/render.h"
+#include "porthole/reveal.h"
+#include "porthole/scene/select.h"
 
 int main(int argc, char** argv) {
     using namespace porthole;
@@ -10,18 +13,14 @@ int main(int argc, char** argv) {
 
     const Scene scene = load_scene(argv[1]);
     const MeshBvhs meshes = build_mesh_bvhs(scene);
-    const Bvh bvh = build_bvh(meshes, all_parts(scene));
 
-    const Bounds3d box = scene_bounds(scene);
-    View view;
-    view.width = 64, view.height = 36;
-    view.orthographic = true;
-    view.half_height = float(box.diagonal()) / 2;
-    view.world_from_camera.p = Vec3f(box.center() + Vec3d{0, 0, box.diagonal()});
-    const Frame frame = render(bvh, nullptr, view, {}, nullptr, nullptr);
+    RevealParams params;
+    params.targets = select_parts(scene, std::vector<std::string>{"sun_gear"});
+    params.camera.name = "iso";
+    params.width = 160, params.height = 90;
+    const Revealed revealed = reveal(meshes, params);
 
-    int hit = 0;
-    for (const PartId id : frame.ids.id.pixels()) hit += id != kNoPart;
-    std::printf("%zu parts, %d of %zu pixels hit\n", scene.parts.size(), hit, frame.ids.id.pixels().size());
-    return hit > 50 && hit < 2000 ? 0 : 1;
+    const double visible = revealed.report.targets.at(0).visible_after.value_or(0);
+    std::printf("%zu parts, %.0f %% of the sun gear is seen\n", scene.parts.size(), 100 * visible);
+    return visible > 0.9 ? 0 : 1;
 }
