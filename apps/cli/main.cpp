@@ -224,7 +224,7 @@ public:
                 item.inputs = std::move(values);
                 found.push_back(std::move(item));
             } else if (std::none_of(all.begin(), all.end(), knows)) {
-                throw Error(ErrorKind::usage, "E0104", where + ":/" + key, "there is no such option");
+                throw Error(ErrorKind::usage, "E0104", where, "\"" + key + "\" is not an option");
             }
         }
         return found;
@@ -257,7 +257,10 @@ Error usage_error(const CLI::App& app, const CLI::ParseError& e) {
         reason = "\"" + word.substr(0, 80) + "\" is not known here";
         const std::vector<std::string> near =
             word.size() < 3 ? std::vector<std::string>{} : nearest_names(word.substr(0, word.find('=')), known, 2);
-        for (std::size_t i = 0; i < near.size(); ++i) reason += (i ? " or " : "; did you mean ") + near[i];
+        for (std::size_t i = 0; i < near.size(); ++i) {
+            reason += i ? " or " : "; did you mean ";
+            reason += near[i];
+        }
         if (!near.empty()) reason += '?';
     }
     return {ErrorKind::usage, "E0101", command, reason + " (" + command + " --help)"};

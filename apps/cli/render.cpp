@@ -38,7 +38,6 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     report.run.write = writing.seconds();
 
     report.view = view;
-    report.camera = picture.camera.name;
     report.nothing_to_cut = true;
     report.frame_rays = frame.rays;
     report.run.threads = thread_count(control);

@@ -58,6 +58,11 @@ void fill_report(Report& report, const char* command, const Scene& scene, const 
     report.model_path = scene.source;
     report.parts = std::int64_t(scene.parts.size());
     report.triangles = std::int64_t(triangle_count(scene));
+    const CameraParams& camera = picture.camera;
+    if (camera.position || camera.direction)
+        report.camera = "custom";
+    else if (report.camera.empty())
+        report.camera = is_auto(camera) ? "iso" : camera.name;
     report.warnings.insert(report.warnings.begin(), scene.warnings.begin(), scene.warnings.end());
     report.run.isa = picture.isa;
     rusage usage{};

@@ -203,6 +203,17 @@ class Reveal(Case):
         self.assertEqual(report["targets"][0]["refused"], "absent")
         self.assertIn("W0104", [w["code"] for w in report["warnings"]])
 
+    def test_strict_minds_some_absent_targets(self):
+        far = nested_boxes().rstrip("\n").splitlines() + ["o far"] + harness.box((99, 0, 0), (100, 1, 1), 17)
+        args = ("reveal", self.write("far.obj", "\n".join(far)), "--target", "inner", "--target", "far", "--camera-position",
+                "0,0,9", "--camera-direction", "0,0,-1", "-o", self.path("o.png"), "--report", self.path("r.json"), *SMALL)
+        self.expect(run(*args), 0, "W0104")
+        self.assertEqual(self.read("o.png")[:4], b"\x89PNG")
+        self.expect(run(*args, "--strict"), 8, "W0104")
+        report = json.loads(self.read("r.json"))
+        self.assertEqual([t["refused"] for t in report["targets"]], [None, "absent"])
+        self.assertEqual(report["camera"]["name"], "custom")
+
     def test_kept_parts_hide(self):
         done = self.expect(run("reveal", self.model, "--target", "inner", "--keep", "outer", "--json", *SMALL), 0)
         report = self.json_of(done)
