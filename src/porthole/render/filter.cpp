@@ -21,7 +21,14 @@ struct Planes {
     alignas(64) float lamps[3][kRows][kRow];
 };
 
-void load(const GBuffer& buffer, const View& view, Rect tile, Planes& p) {
+/// What a tile needs: the filter does nothing where nothing is hit, and grey shadows are one
+/// channel.
+struct Content {
+    bool any = false, colored = false;
+};
+
+Content load(const GBuffer& buffer, const View& view, Rect tile, Planes& p) {
+    Content content;
     for (int row = 0; row < kRows; ++row) {
         const int y = tile.y0 - kApron + row;
         for (int column = 0; column < kRow; ++column) {
@@ -46,8 +53,11 @@ void load(const GBuffer& buffer, const View& view, Rect tile, Planes& p) {
             p.open[row][column] = float(pixel.ambient_open);
             p.all[row][column] = float(pixel.ambient_all);
             for (int c = 0; c < 3; ++c) p.lamps[c][row][column] = float(pixel.lamps[c]);
+            content.any = true;
+            content.colored |= pixel.lamps[0] != pixel.lamps[1] || pixel.lamps[1] != pixel.lamps[2];
         }
     }
+    return content;
 }
 
 /// Sums of one row of pixels over its neighbours.
@@ -56,6 +66,7 @@ struct Sums {
     alignas(64) float lamps[3][FilteredTile::kSize], weight[FilteredTile::kSize];
 };
 
+template <int kChannels>
 void add_neighbours(const Planes& p, int row, int dx, int dy, float weight, Sums& sums) {
     const int other = row + dy;
     for (int i = 0; i < FilteredTile::kSize; ++i) {
@@ -70,9 +81,7 @@ void add_neighbours(const Planes& p, int row, int dx, int dy, float weight, Sums
         sums.weight[i] += w;
         sums.open[i] += w * p.open[other][b];
         sums.all[i] += w * p.all[other][b];
-        sums.lamps[0][i] += w * p.lamps[0][other][b];
-        sums.lamps[1][i] += w * p.lamps[1][other][b];
-        sums.lamps[2][i] += w * p.lamps[2][other][b];
+        for (int c = 0; c < kChannels; ++c) sums.lamps[c][i] += w * p.lamps[c][other][b];
     }
 }
 
@@ -81,20 +90,22 @@ void add_neighbours(const Planes& p, int row, int dx, int dy, float weight, Sums
 void filter_tile(const GBuffer& buffer, const View& view, Rect tile, FilteredTile& out) {
     out.tile = tile;
     const auto planes = std::make_unique<Planes>();
-    load(buffer, view, tile, *planes);
+    const Content content = load(buffer, view, tile, *planes);
+    if (!content.any) return;
     Sums sums;
     for (int y = 0; y < tile.height(); ++y) {
         sums = {};
         for (int dy = -kApron; dy <= kApron; ++dy)
             for (int dx = -kApron; dx <= kApron; ++dx) {
                 const float weight = (std::abs(dx) == kApron ? 0.5f : 1.0f) * (std::abs(dy) == kApron ? 0.5f : 1.0f);
-                add_neighbours(*planes, y + kApron, dx, dy, weight, sums);
+                if (content.colored) add_neighbours<3>(*planes, y + kApron, dx, dy, weight, sums);
+                else add_neighbours<1>(*planes, y + kApron, dx, dy, weight, sums);
             }
         const int first = y * FilteredTile::kSize;
         for (int i = 0; i < FilteredTile::kSize; ++i) {
             out.ambient[first + i] = sums.all[i] > 0 ? sums.open[i] / sums.all[i] : 1.0f;
             const float scale = sums.weight[i] > 0 ? 1.0f / (255.0f * sums.weight[i]) : 0.0f;
-            for (int c = 0; c < 3; ++c) out.lamps[c][first + i] = sums.lamps[c][i] * scale;
+            for (int c = 0; c < 3; ++c) out.lamps[c][first + i] = sums.lamps[content.colored ? c : 0][i] * scale;
         }
     }
 }

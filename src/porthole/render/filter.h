@@ -23,7 +23,7 @@ struct FilteredTile {
 /// ones at half weight: every offset of the 4x4 pattern weighs the same, so on a surface
 /// without edges all 16 patterns count equally and no grain is left. Only neighbours of the
 /// same part and side of the rim, with a similar normal and near the pixel's tangent plane
-/// count. Writes `out` (large: keep one per thread).
+/// count. Writes `out` at the tile's pixels that hit something (64 KB: mind the stack).
 /// @param view  the buffer's; gives positions and the size of a pixel.
 void filter_tile(const GBuffer& buffer, const View& view, Rect tile, FilteredTile& out);
 

@@ -218,8 +218,14 @@ void Shader::trace_newest() {
     }
     if (any_plain) intersect(stage.bvh, packet, Coherence::incoherent);
 
+    std::array<Hit, kLanes> hit;
+    std::array<SurfacePoint, kLanes> surface;
+    std::array<Asker, kLanes> askers;
+    std::array<int, kLanes> asker_of; ///< -1: nothing to shade
+    std::size_t asking = 0;
     for (int i = 0; i < int(n); ++i) {
         PathRay& ray = rays[std::size_t(i)];
+        asker_of[std::size_t(i)] = -1;
         const RayHit16& from = cuts && ray.in_hole ? open : packet;
         if (!from.hit(i)) {
             end_in_surroundings(ray);
@@ -228,17 +234,37 @@ void Shader::trace_newest() {
         const std::int32_t medium = ray.media.innermost();
         if (medium != kNone) ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);
         if (largest(ray.weight) < least_weight(ray)) continue;
-        const Hit hit{from.part(i), from.triangle[i], from.u[i], from.v[i]};
-        const Placement& placement = stage.placements[index(hit.part)];
-        const SurfacePoint point = surface_point(placement, hit, ray.direction);
-        const Material& m = stage.scene.materials[placement.mesh->material_of(hit.triangle)];
-        Reach reach;
+        Hit& h = hit[std::size_t(i)];
+        h = {from.part(i), from.triangle[i], from.u[i], from.v[i]};
+        const Placement& placement = stage.placements[index(h.part)];
+        SurfacePoint& p = surface[std::size_t(i)];
+        p = surface_point(placement, h, ray.direction);
+        const Material& m = stage.scene.materials[placement.mesh->material_of(h.triangle)];
         // Clear glass has no matte layer that shadows could fall on.
         const bool clear = m.transmission > 0.99f && m.transmission_texture.texture < 0;
-        if (!m.unlit && !clear)
-            reach = stage.occlusion.reach({point.position, point.start, point.flat_normal, point.normal, ray.in_hole, 0}, *rays_);
-        add(ray, hit, point, reach, false);
+        asker_of[std::size_t(i)] = kLanes; // shaded as fully lit
+        if (m.unlit || clear) continue;
+        asker_of[std::size_t(i)] = int(asking);
+        askers[asking++] = {p.position, p.start, p.flat_normal, p.normal, ray.in_hole, ray.pattern};
     }
+    std::array<Reach, kLanes + 1> reach;
+    reach_of(std::span(askers.data(), asking), reach.data());
+    reach[kLanes] = {};
+    for (std::size_t i = 0; i < n; ++i)
+        if (asker_of[i] >= 0) add(rays[i], hit[i], surface[i], reach[std::size_t(asker_of[i])], false);
+}
+
+void Shader::reach_of(std::span<const Asker> points, Reach* reach) {
+    const Occlusion& occlusion = stage_->occlusion;
+    if (!averaged_) {
+        for (std::size_t i = 0; i < points.size(); ++i) reach[i] = occlusion.reach(points[i], *rays_);
+        return;
+    }
+    std::array<Vec3f, kLanes> lamps;
+    std::array<Occlusion::Ambient, kLanes> ambient;
+    occlusion.lamps(points, lamps.data(), *rays_);
+    occlusion.ambient(points, ambient.data(), *rays_);
+    for (std::size_t i = 0; i < points.size(); ++i) reach[i] = {lamps[i], ambient[i].share()};
 }
 
 } // namespace porthole

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "porthole/render/lighting.h"
@@ -65,7 +66,10 @@ struct Stage {
 class Shader {
 public:
     /// @param slots  how many samples are gathered at once.
-    Shader(const Stage& stage, std::size_t slots, RayCounts& rays) : stage_(&stage), radiance_(slots), rays_(&rays) {}
+    /// @param averaged  the samples are some of many that are averaged: few shadow and ambient
+    ///                  rays at what mirrors and glass show, of patterns that differ by sample.
+    Shader(const Stage& stage, std::size_t slots, bool averaged, RayCounts& rays)
+        : stage_(&stage), radiance_(slots), averaged_(averaged), rays_(&rays) {}
 
     /// A camera ray that meets nothing.
     void miss(std::uint32_t slot) { radiance_[slot].background = {1, 1, 1}; }
@@ -84,9 +88,11 @@ private:
     void push(const PathRay& ray);
     void end_in_surroundings(const PathRay& ray);
     void trace_newest();
+    void reach_of(std::span<const Asker> points, Reach* reach);
 
     const Stage* stage_;
     std::vector<Radiance> radiance_;
+    bool averaged_;
     std::vector<PathRay> queue_;
     RayCounts* rays_;
 };

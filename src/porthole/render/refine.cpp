@@ -4,43 +4,7 @@ namespace porthole {
 
 namespace {
 
-constexpr float kCrease = 0.96f;        ///< cosine: normals that differ more are a crease
-constexpr float kContrast = 0.05f;      ///< of encoded brightness, on one smooth surface
-constexpr float kSmallContrast = 0.015f; ///< across a crease or step
 constexpr float kBorrowNormal = 0.9f;
-
-/// Roughly as the eye (and the file) sees it.
-Vec4f encoded(Vec4f c) {
-    const auto root = [](float v) { return std::sqrt(std::max(v, 0.0f)); };
-    return {root(c.x), root(c.y), root(c.z), c.w};
-}
-
-float contrast(Vec4f a, Vec4f b) {
-    return std::max({std::abs(a.x - b.x), std::abs(a.y - b.y), std::abs(a.z - b.z), std::abs(a.w - b.w)});
-}
-
-/// Whether two pixels see the same smooth piece of surface.
-bool same_surface(const Picture& picture, int ax, int ay, int bx, int by) {
-    const GBuffer& g = picture.buffer;
-    if (g.ids.id(ax, ay) == kNoPart) return true;
-    const Vec3f na = unpack_normal(g.pixels(ax, ay).normal), nb = unpack_normal(g.pixels(bx, by).normal);
-    if (dot(na, nb) < kCrease) return false;
-    const auto position = [&](int x, int y) {
-        const Ray ray = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f);
-        return ray.origin + ray.direction * (g.ids.depth(x, y) / ray.depth_per_t);
-    };
-    const Vec3f step = position(bx, by) - position(ax, ay);
-    const float pixel = picture.view.pixel_size(std::min(g.ids.depth(ax, ay), g.ids.depth(bx, by)));
-    return std::min(std::abs(dot(step, na)), std::abs(dot(step, nb))) < pixel;
-}
-
-bool differs(const Picture& picture, int ax, int ay, int bx, int by) {
-    const GBuffer& g = picture.buffer;
-    if (g.key(ax, ay) != g.key(bx, by)) return true;
-    const float c = contrast(encoded(picture.color(ax, ay)), encoded(picture.color(bx, by)));
-    if (c > kContrast) return true;
-    return c > kSmallContrast && !same_surface(picture, ax, ay, bx, by);
-}
 
 /// Filtered ambient light of a neighbouring pixel on the same surface; negative if none.
 float borrow_ambient(const GBuffer& buffer, std::uint32_t key, Vec3f normal, float sx, float sy) {
@@ -138,7 +102,7 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
     RayCounts rays;
     FilteredTile filtered;
     if (!flat) filter_tile(buffer, picture.view, tile, filtered);
-    Shader shader(stage, FilteredTile::kSize * FilteredTile::kSize, rays);
+    Shader shader(stage, FilteredTile::kSize * FilteredTile::kSize, false, rays);
     filtered.tile = tile;
     for (int y = tile.y0; y < tile.y1; ++y)
         for (int x = tile.x0; x < tile.x1; ++x) {
@@ -169,22 +133,6 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
     picture.rays.add(rays);
 }
 
-void find_edges(Picture& picture, Rect tile) {
-    const Rect w = picture.buffer.window();
-    for (int y = tile.y0; y < tile.y1; ++y)
-        for (int x = tile.x0; x < tile.x1; ++x) {
-            const Pixel& pixel = picture.buffer.pixels(x, y);
-            if (!pixel.has(Pixel::traced)) continue;
-            bool edge = pixel.has(Pixel::rim);
-            const auto look = [&](int ox, int oy) {
-                if (edge || !w.contains(ox, oy) || !picture.buffer.pixels(ox, oy).has(Pixel::traced)) return;
-                edge = differs(picture, x, y, ox, oy);
-            };
-            look(x + 1, y), look(x - 1, y), look(x, y + 1), look(x, y - 1);
-            picture.edges(x, y) = edge ? 1 : 0;
-        }
-}
-
 void refine_tile(Picture& picture, const Stage& stage, Rect tile) {
     const int n = picture.params.samples;
     std::vector<Vec2i> todo;
@@ -198,7 +146,7 @@ void refine_tile(Picture& picture, const Stage& stage, Rect tile) {
     RayCounts rays;
     // Samples are shaded in groups, so that mirrored and refracted rays fill their packets.
     constexpr int kGroup = 16;
-    Shader shader(stage, std::size_t(kGroup) * kLanes, rays);
+    Shader shader(stage, std::size_t(kGroup) * kLanes, true, rays);
     for (std::size_t begin = 0; begin < todo.size(); begin += kLanes) {
         const std::span<const Vec2i> pixels(todo.data() + begin, std::min<std::size_t>(kLanes, todo.size() - begin));
         std::array<Vec4f, kLanes> sum;
