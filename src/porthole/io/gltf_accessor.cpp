@@ -183,6 +183,7 @@ std::vector<Accessor> read_accessors(Document& doc, std::span<const BufferView> 
     // of memory. Compressed data stays far below 64 elements per byte.
     const std::uint64_t most_zeros = std::max<std::uint64_t>(file_bytes, 1024) * 64;
 
+    std::uint64_t sparse_total = 0;
     std::vector<Accessor> accessors;
     const std::span<const Json> list = doc.list_of_objects(doc.root(), "accessors");
     accessors.reserve(list.size());
@@ -239,7 +240,14 @@ std::vector<Accessor> read_accessors(Document& doc, std::span<const BufferView> 
         } else if (offset != 0) {
             doc.warn("W0307", json, "byteOffset", "has no meaning without a buffer view; ignored");
         }
-        if (const Json* sparse = doc.object(json, "sparse")) read_sparse(doc, views, *sparse, a);
+        const Json* sparse = doc.object(json, "sparse");
+        if (!sparse) continue;
+        // Every replaced element has bytes of its own; views that are shared to excess would
+        // make a small file slow.
+        sparse_total += doc.need_uint(*sparse, "count");
+        if (sparse_total > std::max<std::uint64_t>(file_bytes, 1024))
+            doc.fail_limit(*sparse, "count", "more sparse elements than the file has bytes");
+        read_sparse(doc, views, *sparse, a);
     }
     return accessors;
 }

@@ -19,7 +19,8 @@ struct Opened {
     explicit Opened(const TestFile& file) : bytes(file.glb()), doc("test.glb", file_root(file)) {
         const Container c =
             open_container({reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()}, "test.glb");
-        buffers = read_buffers(doc, c, "test.glb");
+        UriReader uris("test.glb");
+        buffers = read_buffers(doc, c, uris);
         views = read_buffer_views(doc, buffers, 1 << 30, {});
         accessors = read_accessors(doc, views, bytes.size());
     }

@@ -29,7 +29,7 @@ struct Curve {
 
 // The curve of a sampler for `width` values per key; false after a warning when it has none.
 bool read_curve(Document& doc, std::span<const Accessor> accessors, const Json& sampler, std::size_t width,
-                Curve& curve) {
+                std::uint64_t& key_budget, Curve& curve) {
     const Accessor& input = accessors[doc.need_index(sampler, "input", accessors.size(), "accessor")];
     const Accessor& output = accessors[doc.need_index(sampler, "output", accessors.size(), "accessor")];
     const std::string_view name = doc.string_or(sampler, "interpolation", "LINEAR");
@@ -48,6 +48,9 @@ bool read_curve(Document& doc, std::span<const Accessor> accessors, const Json& 
                      " values, which do not fit; the channel is left out");
         return false;
     }
+    if (input.count > key_budget)
+        doc.fail_limit(sampler, "input", "the channels together have more keys than the file has bytes");
+    key_budget -= input.count;
     curve.times.resize(input.count);
     curve.values.resize(input.count * per_key);
     read_floats(input, 0, input.count, 1, curve.times.data());
@@ -64,13 +67,12 @@ bool read_curve(Document& doc, std::span<const Accessor> accessors, const Json& 
 
 std::size_t target_count(const Document& doc, const Node& node) {
     if (node.mesh == kNone) return 0;
-    const std::span<const Json> primitives =
-        doc.list_of_objects(doc.list_of_objects(doc.root(), "meshes")[std::size_t(node.mesh)], "primitives");
-    return primitives.empty() ? 0 : doc.list(primitives[0], "targets").size();
+    const std::span<const Json> primitives = doc.list(doc.element("meshes", std::size_t(node.mesh)), "primitives");
+    return primitives.empty() || !primitives[0].is_object() ? 0 : doc.list(primitives[0], "targets").size();
 }
 
 void apply_channel(Document& doc, std::span<const Accessor> accessors, std::span<const Json> samplers,
-                   const Json& channel, double time, std::vector<Node>& nodes) {
+                   const Json& channel, double time, std::uint64_t& key_budget, std::vector<Node>& nodes) {
     const Json* target = doc.object(channel, "target");
     if (!target) doc.fail("E0303", channel, {}, "has no \"target\", which glTF requires");
     const std::string_view path = doc.string_or(*target, "path");
@@ -98,7 +100,7 @@ void apply_channel(Document& doc, std::span<const Accessor> accessors, std::span
     }
     Curve curve;
     const std::uint32_t sampler = doc.need_index(channel, "sampler", samplers.size(), "sampler");
-    if (!read_curve(doc, accessors, samplers[sampler], width, curve)) return;
+    if (!read_curve(doc, accessors, samplers[sampler], width, key_budget, curve)) return;
     const std::vector<double> v =
         sample_curve(curve.times, curve.values, int(width), curve.interpolation, path == "rotation", time);
     if (path == "translation")
@@ -154,15 +156,17 @@ std::vector<double> sample_curve(std::span<const float> times, std::span<const f
     return out;
 }
 
-void animate(Document& doc, std::span<const Accessor> accessors, double time, std::vector<Node>& nodes) {
+void animate(Document& doc, std::span<const Accessor> accessors, double time, std::uint64_t file_bytes,
+             std::vector<Node>& nodes) {
     const std::span<const Json> animations = doc.list_of_objects(doc.root(), "animations");
     if (animations.empty()) {
         doc.warn("W0309", doc.root(), {}, "the file has no animation; the rest pose is read");
         return;
     }
     const std::span<const Json> samplers = doc.list_of_objects(animations[0], "samplers");
+    std::uint64_t key_budget = file_bytes; // a key has values of its own, of a byte at least
     for (const Json& channel : doc.list_of_objects(animations[0], "channels"))
-        apply_channel(doc, accessors, samplers, channel, time, nodes);
+        apply_channel(doc, accessors, samplers, channel, time, key_budget, nodes);
 }
 
 } // namespace porthole::gltf

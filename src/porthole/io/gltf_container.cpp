@@ -135,7 +135,7 @@ std::optional<std::vector<std::byte>> decode_base64(std::string_view text) {
     return out;
 }
 
-Bytes read_uri(std::string_view uri, const std::filesystem::path& model, const std::string& where) {
+Bytes UriReader::read(std::string_view uri, const std::string& where) {
     if (uri.starts_with("data:")) {
         const auto comma = uri.find(',');
         if (comma == uri.npos)
@@ -147,18 +147,19 @@ Bytes read_uri(std::string_view uri, const std::filesystem::path& model, const s
         auto owner = std::make_shared<std::vector<std::byte>>(std::move(*decoded));
         return {*owner, owner};
     }
-    if (model == "-")
+    if (model_ == "-")
         throw Error(ErrorKind::input, "E0307", where,
                     "a model from standard input cannot name other files: " + shortened(uri) + "; use a GLB file");
-    const std::filesystem::path path = resolve_beside(model, uri, where);
+    const std::filesystem::path path = resolve_beside(model_, uri, where);
+    if (const auto known = files_.find(path); known != files_.end()) return known->second;
     std::error_code ignored;
-    if (std::filesystem::equivalent(path, model, ignored))
+    if (std::filesystem::equivalent(path, model_, ignored))
         throw Error(ErrorKind::input, "E0307", where, "the URI names the model file itself: " + shortened(uri));
     auto owner = std::make_shared<FileBytes>(path);
-    return {owner->bytes(), owner};
+    return files_[path] = {owner->bytes(), owner};
 }
 
-std::vector<Buffer> read_buffers(Document& doc, const Container& container, const std::filesystem::path& model) {
+std::vector<Buffer> read_buffers(Document& doc, const Container& container, UriReader& uris) {
     std::vector<Buffer> buffers;
     const std::span<const Json> list = doc.list_of_objects(doc.root(), "buffers");
     buffers.reserve(list.size());
@@ -175,7 +176,7 @@ std::vector<Buffer> read_buffers(Document& doc, const Container& container, cons
         if (fallback)
             buffer.undefined = true; // its views are decoded from another buffer
         else if (uri)
-            buffer.bytes = read_uri(text, model, doc.where(*uri));
+            buffer.bytes = uris.read(text, doc.where(*uri));
         else if (i == 0 && container.has_bin)
             buffer.bytes.data = container.bin;
         else if (i == 0 && container.glb && length > 0)

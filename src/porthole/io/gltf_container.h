@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -41,14 +42,21 @@ struct Buffer {
     bool undefined = false;
 };
 
-/// The bytes of a data URI or of a file beside the model.
-/// @throws Error E0307 for a broken data URI or the model itself; E02xx from resolve_beside.
-[[nodiscard]] Bytes read_uri(std::string_view uri, const std::filesystem::path& model, const std::string& where);
+/// What URIs in a model name: data URIs, and files beside it, each read once.
+class UriReader {
+public:
+    explicit UriReader(std::filesystem::path model) : model_(std::move(model)) {}
+    /// @throws Error E0307 for a broken data URI or the model itself; E02xx from resolve_beside.
+    [[nodiscard]] Bytes read(std::string_view uri, const std::string& where);
+
+private:
+    std::filesystem::path model_;
+    std::map<std::filesystem::path, Bytes> files_;
+};
 
 /// All buffers, each cut to its byteLength.
-/// @throws Error E0301 when one is shorter than its byteLength says, and as read_uri.
-[[nodiscard]] std::vector<Buffer> read_buffers(Document& doc, const Container& container,
-                                               const std::filesystem::path& model);
+/// @throws Error E0301 when one is shorter than its byteLength says, and as UriReader.
+[[nodiscard]] std::vector<Buffer> read_buffers(Document& doc, const Container& container, UriReader& uris);
 
 /// RFC 4648 base64, padded or not, without white space; nullopt when broken.
 [[nodiscard]] std::optional<std::vector<std::byte>> decode_base64(std::string_view text);

@@ -1,6 +1,7 @@
 // KHR_draco_mesh_compression.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -16,6 +17,8 @@ namespace porthole::gltf {
 struct DracoAttribute {
     std::uint32_t id = 0;
     bool normalized = false;
+
+    friend auto operator<=>(const DracoAttribute&, const DracoAttribute&) = default;
 };
 
 struct DracoMesh {

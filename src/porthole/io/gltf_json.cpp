@@ -114,31 +114,29 @@ Json parse_json(std::string_view text, const std::string& file, std::uint64_t by
 std::string Document::pointer_of(const Json& at) const {
     struct Frame {
         const Json* value;
-        std::size_t parent;
-        std::string_view name;
-        std::size_t index;
+        Json::const_iterator member;
     };
-    std::vector<Frame> frames{{&root_, 0, {}, 0}};
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-        const Json& value = *frames[i].value;
-        if (&value == &at) {
-            std::vector<std::string> tokens;
-            for (std::size_t k = i; k != 0; k = frames[k].parent)
-                tokens.push_back(frames[frames[k].parent].value->is_object() ? escape_pointer(frames[k].name)
-                                                                             : std::to_string(frames[k].index));
-            std::string pointer;
-            for (auto token = tokens.rbegin(); token != tokens.rend(); ++token) pointer += '/' + *token;
-            return pointer;
+    std::vector<Frame> path;
+    if (&root_ != &at) path.push_back({&root_, root_.begin()});
+    while (!path.empty()) {
+        Frame& top = path.back();
+        if (top.member == top.value->end()) {
+            path.pop_back();
+            if (!path.empty()) ++path.back().member;
+            continue;
         }
-        if (value.is_object()) {
-            for (const auto& [name, member] : value.get_ref<const Json::object_t&>())
-                frames.push_back({&member, i, name, 0});
-        } else if (value.is_array()) {
-            std::size_t n = 0;
-            for (const Json& member : value.get_ref<const Json::array_t&>()) frames.push_back({&member, i, {}, n++});
-        }
+        const Json& member = *top.member;
+        if (&member == &at) break;
+        if (member.is_structured())
+            path.push_back({&member, member.begin()});
+        else
+            ++top.member;
     }
-    return "";
+    std::string pointer;
+    for (const Frame& frame : path)
+        pointer += '/' + (frame.value->is_object() ? escape_pointer(frame.member.key())
+                                                   : std::to_string(frame.member - frame.value->begin()));
+    return pointer;
 }
 
 std::string Document::where(const Json& at, std::string_view below) const {
@@ -197,6 +195,12 @@ std::span<const Json> Document::list_of_objects(const Json& object, std::string_
     for (const Json& value : all)
         if (!value.is_object()) fail("E0303", value, {}, type_error(value, "object"));
     return all;
+}
+
+const Json& Document::element(std::string_view key, std::size_t i) const {
+    const Json& value = list(root_, key)[i];
+    if (!value.is_object()) fail("E0303", value, {}, type_error(value, "object"));
+    return value;
 }
 
 std::optional<std::uint64_t> Document::as_uint(const Json& value) {

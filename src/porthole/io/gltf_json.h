@@ -55,9 +55,12 @@ public:
     [[nodiscard]] static const Json* find(const Json& object, std::string_view key);
     [[nodiscard]] const Json* object(const Json& object, std::string_view key) const;
     [[nodiscard]] const Json* extension(const Json& object, std::string_view name) const;
-    /// The members of the array `key`; empty if absent. list_of_objects checks their type too.
+    /// The members of the array `key`; empty if absent. list_of_objects checks their type too,
+    /// which takes time linear in their number: not for loops.
     [[nodiscard]] std::span<const Json> list(const Json& object, std::string_view key) const;
     [[nodiscard]] std::span<const Json> list_of_objects(const Json& object, std::string_view key) const;
+    /// Element `i`, which must be there, of the root's list `key`; an object.
+    [[nodiscard]] const Json& element(std::string_view key, std::size_t i) const;
     [[nodiscard]] std::optional<std::uint64_t> uint(const Json& object, std::string_view key) const;
     [[nodiscard]] std::uint64_t uint_or(const Json& object, std::string_view key, std::uint64_t fallback) const;
     [[nodiscard]] std::uint64_t need_uint(const Json& object, std::string_view key) const;

@@ -91,7 +91,7 @@ void read_extensions(Document& doc, const Json& json, TextureReader& textures, M
 
 Material read_material(Document& doc, const Json& json, TextureReader& textures) {
     Material m;
-    m.name = name_of(doc, json);
+    m.name = without_nul(raw_name(json));
     const Json* pbr = doc.object(json, "pbrMetallicRoughness");
     const Json* spec = doc.extension(json, "KHR_materials_pbrSpecularGlossiness");
     if (spec)
@@ -124,9 +124,9 @@ Material read_material(Document& doc, const Json& json, TextureReader& textures)
 } // namespace
 
 MaterialSet read_materials(Document& doc, std::span<const std::uint8_t> used, std::span<const BufferView> views,
-                           const std::filesystem::path& model, const LoadParams& params, const Control& control) {
+                           UriReader& uris, const LoadParams& params, const Control& control) {
     const std::span<const Json> list = doc.list_of_objects(doc.root(), "materials");
-    TextureReader textures(doc, views, model);
+    TextureReader textures(doc, views, uris);
     MaterialSet set;
     set.material_of.assign(used.size(), 0);
     for (std::size_t i = 0; i < list.size(); ++i) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <span>
 #include <vector>
@@ -27,14 +26,12 @@ struct MaterialSet {
 /// read is a warning and an empty image.
 /// @throws Error E0303; limit E0902 when the images pass params.max_bytes; Cancelled.
 [[nodiscard]] MaterialSet read_materials(Document& doc, std::span<const std::uint8_t> used,
-                                         std::span<const BufferView> views, const std::filesystem::path& model,
-                                         const LoadParams& params, const Control& control);
+                                         std::span<const BufferView> views, UriReader& uris, const LoadParams& params, const Control& control);
 
 /// Collects the textures that materials use, then decodes their images.
 class TextureReader {
 public:
-    TextureReader(Document& doc, std::span<const BufferView> views, const std::filesystem::path& model)
-        : doc_(doc), views_(views), model_(model) {}
+    TextureReader(Document& doc, std::span<const BufferView> views, UriReader& uris);
 
     /// The textureInfo `key` of `object`, KHR_texture_transform included; none if it is
     /// absent, refers to nothing or has no image of a kind that we read (a warning then).
@@ -45,12 +42,13 @@ public:
 private:
     std::int32_t texture_of(const Json& info);
     std::int32_t image_of(const Json& texture);
-    [[nodiscard]] Bytes bytes_of(const Json& image) const;
+    [[nodiscard]] Bytes bytes_of(const Json& image);
     [[nodiscard]] static std::vector<std::size_t> first_of_equals(std::span<const Bytes> bytes);
 
     Document& doc_;
     std::span<const BufferView> views_;
-    const std::filesystem::path& model_;
+    UriReader& uris_;
+    std::span<const Json> texture_list_, image_list_, sampler_list_;
     std::vector<Texture> textures_;
     std::vector<const Json*> images_;
     std::map<std::uint64_t, std::int32_t> texture_by_index_, image_by_index_;

@@ -12,6 +12,7 @@
 namespace porthole::gltf {
 namespace {
 
+constexpr std::size_t kMostCompared = 64;            // earlier primitives, for a shared vertex array
 constexpr std::size_t kChunk = std::size_t(1) << 16; // vertices or triangles per job
 
 // A glTF mesh that is used, with what was decoded for it.
@@ -39,17 +40,22 @@ struct Job {
     VertexFaults faults;
 };
 
+// One decoding, for all primitives that name the same data: exporters keep equal geometry once.
 struct DracoJob {
-    Primitive* primitive = nullptr;
+    struct User {
+        Primitive* primitive = nullptr;
+        std::vector<const Accessor**> slots; // of its attributes, as `wanted`
+    };
     std::span<const std::byte> bytes;
     std::vector<DracoAttribute> wanted;
-    std::vector<const Accessor**> slots; // of the primitive's attributes, as `wanted`
+    std::vector<User> users;
     DracoMesh result;
 };
 
-// The Draco identifiers of the attributes, and where their accessors will be put.
-void plan_draco(const Document& doc, const MeshSource& source, const Json& extension, Primitive& p, DracoJob& job) {
-    job.primitive = &p;
+// The Draco identifiers of a primitive's attributes, and where their accessors will be put.
+DracoJob plan_draco(const Document& doc, const MeshSource& source, const Json& extension, Primitive& p) {
+    DracoJob job;
+    DracoJob::User user{&p, {}};
     const BufferView& view = source.views[doc.need_index(extension, "bufferView", source.views.size(), "buffer view")];
     job.bytes = view.bytes.data;
     const Json* ids = doc.object(extension, "attributes");
@@ -58,7 +64,7 @@ void plan_draco(const Document& doc, const MeshSource& source, const Json& exten
         const auto id = doc.uint(*ids, name);
         if (!id || !slot) return; // not compressed, or not declared: stays as it is
         job.wanted.push_back({static_cast<std::uint32_t>(*id), slot->normalized});
-        job.slots.push_back(&slot);
+        user.slots.push_back(&slot);
     };
     Attributes& a = p.attributes;
     want("POSITION", a.position);
@@ -71,29 +77,43 @@ void plan_draco(const Document& doc, const MeshSource& source, const Json& exten
         want("JOINTS_" + std::to_string(n), a.joints[n]);
         want("WEIGHTS_" + std::to_string(n), a.weights[n]);
     }
+    job.users.push_back(std::move(user));
+    return job;
 }
 
 std::vector<std::unique_ptr<DracoJob>> decode_draco_primitives(const Document& doc, const MeshSource& source,
                                                                std::map<std::uint32_t, Shape>& shapes,
-                                                               const Control& control) {
+                                                               const LoadParams& params, const Control& control) {
     std::vector<std::unique_ptr<DracoJob>> jobs;
+    std::map<std::pair<const std::byte*, std::vector<DracoAttribute>>, DracoJob*> known;
+    std::uint64_t total = 0;
     for (auto& [mesh, shape] : shapes)
         for (Primitive& p : shape.primitives) {
             const Json* extension = doc.extension(*p.json, "KHR_draco_mesh_compression");
             if (!extension || p.topology == Topology::none) continue;
-            jobs.push_back(std::make_unique<DracoJob>());
-            plan_draco(doc, source, *extension, p, *jobs.back());
-            p.draco = static_cast<std::int32_t>(jobs.size() - 1);
+            DracoJob job = plan_draco(doc, source, *extension, p);
+            DracoJob*& same = known[{job.bytes.data(), job.wanted}];
+            if (same && same->bytes.size() == job.bytes.size()) {
+                same->users.push_back(std::move(job.users[0]));
+                continue;
+            }
+            total += job.bytes.size();
+            if (total > params.max_bytes / 8)
+                doc.fail_limit(*extension, {}, "the Draco data is used more often than its size allows");
+            jobs.push_back(std::make_unique<DracoJob>(std::move(job)));
+            same = jobs.back().get();
         }
     parallel_in_order(jobs.size(), control, [&](std::size_t i) {
         DracoJob& job = *jobs[i];
         job.result = decode_draco(job.bytes, job.wanted);
         if (!job.result.error.empty())
-            doc.fail("E0308", *job.primitive->json, "extensions/KHR_draco_mesh_compression",
+            doc.fail("E0308", *job.users[0].primitive->json, "extensions/KHR_draco_mesh_compression",
                      "the Draco data " + job.result.error + "; the file is damaged?");
-        for (std::size_t k = 0; k < job.slots.size(); ++k) *job.slots[k] = &job.result.attributes[k];
-        job.primitive->indices = &job.result.indices;
-        job.primitive->topology = Topology::triangles; // Draco has stored strips as triangles
+        for (const DracoJob::User& user : job.users) {
+            for (std::size_t k = 0; k < user.slots.size(); ++k) *user.slots[k] = &job.result.attributes[k];
+            user.primitive->indices = &job.result.indices;
+            user.primitive->topology = Topology::triangles; // Draco has stored strips as triangles
+        }
     });
     return jobs;
 }
@@ -107,8 +127,8 @@ Layout lay_out(const Document& doc, const Shape& shape, const Json& mesh_json) {
                       true};
         // Many exporters cut one vertex array into primitives by material: keep it one array.
         std::vector<std::size_t>& candidates = by_position[p.attributes.position];
-        for (const std::size_t i : candidates) {
-            const Placed& other = layout.placed[i];
+        for (std::size_t back = 1; back <= std::min(candidates.size(), kMostCompared); ++back) {
+            const Placed& other = layout.placed[candidates[candidates.size() - back]];
             if (other.primitive->attributes == p.attributes && other.primitive->targets == p.targets) {
                 placed.first_vertex = other.first_vertex;
                 placed.fills_vertices = false;
@@ -252,11 +272,10 @@ void parallel_in_order(std::size_t n, const Control& control, const std::functio
 }
 
 std::vector<std::uint8_t> used_materials(const Document& doc, std::span<const MeshRequest> requests) {
-    const std::span<const Json> meshes = doc.list_of_objects(doc.root(), "meshes");
     const std::size_t materials = doc.list_of_objects(doc.root(), "materials").size();
     std::vector<std::uint8_t> used(materials + 1, 0);
     for (const MeshRequest& request : requests)
-        for (const Json& primitive : doc.list_of_objects(meshes[request.mesh], "primitives"))
+        for (const Json& primitive : doc.list_of_objects(doc.element("meshes", request.mesh), "primitives"))
             used[doc.index(primitive, "material", materials, "material")
                      .value_or(static_cast<std::uint32_t>(materials))] = 1;
     return used;
@@ -270,7 +289,7 @@ std::vector<Mesh> build_meshes(Document& doc, const MeshSource& source, std::spa
         const auto [shape, fresh] = shapes.try_emplace(request.mesh);
         if (fresh) shape->second.primitives = read_primitives(doc, source.accessors, request.mesh);
     }
-    const auto draco = decode_draco_primitives(doc, source, shapes, control); // owns what they point to
+    const auto draco = decode_draco_primitives(doc, source, shapes, params, control); // owns what they point to
     for (auto& [mesh, shape] : shapes)
         for (Primitive& p : shape.primitives)
             if (p.topology != Topology::none) settle_counts(doc, p);
@@ -285,7 +304,7 @@ std::vector<Mesh> build_meshes(Document& doc, const MeshSource& source, std::spa
         if (total > params.max_bytes)
             doc.fail_limit(json, {},
                            "the geometry takes more than the allowed " + std::to_string(params.max_bytes) +
-                               " bytes; raise the memory limit");
+                               " bytes (the memory limit, or 64 times the file's data)");
     }
 
     std::vector<Mesh> meshes(requests.size());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -35,20 +36,15 @@ struct Primitive {
     Attributes attributes;
     std::vector<Attributes> targets;   ///< differences, one per morph target
     const Accessor* indices = nullptr; ///< null: 0, 1, 2, ...
-    std::int32_t draco = kNone;        ///< where it was decoded to
     std::uint64_t vertices = 0, corners = 0, triangles = 0;
 };
 
-/// A mesh as one or several nodes need it: the same request gives the same Mesh.
+/// A mesh as one or several nodes need it.
 struct MeshRequest {
-    std::uint32_t mesh = 0;                ///< glTF mesh
-    std::vector<float> weights;            ///< of morph targets; empty: not morphed
-    std::int32_t skin = kNone;             ///< glTF skin; the vertices end up in world space
-    std::vector<Affine3d> world_from_bind; ///< by joint
-
-    [[nodiscard]] bool same_as(const MeshRequest& other) const {
-        return mesh == other.mesh && skin == other.skin && weights == other.weights;
-    }
+    std::uint32_t mesh = 0;                                       ///< glTF mesh
+    std::vector<float> weights;                                   ///< of morph targets; empty: not morphed
+    std::int32_t skin = kNone;                                    ///< glTF skin; the vertices end up in world space
+    std::shared_ptr<const std::vector<Affine3d>> world_from_bind; ///< by joint; null without a skin
 };
 
 /// The data that all meshes draw from.

@@ -212,6 +212,32 @@ TEST(GltfMesh, MemoryLimit) {
     EXPECT_EQ(error_of([&] { return read_gltf(FileBytes(file.glb()), "x.glb", params, {}); }).code, "E0902");
 }
 
+// What can be referred to any number of times must not fill the memory: nothing here takes
+// more than a moment.
+TEST(GltfMesh, SmallFilesDoNotUnfold) {
+    TestFile many;
+    const auto positions = many.vec3(std::vector<float>(300000, 1));
+    for (int i = 0; i < 1000; ++i) many.add_mesh({{"POSITION", positions}}); // 1.2 GB
+    EXPECT_EQ(error_of([&] { return many.read(); }).code, "E0902");
+
+    TestFile instances;
+    instances.root["accessors"] = {{{"componentType", 5126}, {"type", "VEC3"}, {"count", 65000}}};
+    instances.add_mesh({{"POSITION", instances.triangle()}});
+    instances.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 0;
+    for (int i = 0; i < 100; ++i) instances.root["nodes"].push_back(Json(instances.root["nodes"][0]));
+    EXPECT_EQ(error_of([&] { return instances.read(); }).code, "E0902");
+
+    TestFile sparse;
+    const auto base = sparse.add(std::vector<std::uint8_t>(4000, 0), "SCALAR", 5121, 1);
+    std::vector<std::uint16_t> all(4000);
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint16_t>(i);
+    const auto at = sparse.add_view(all);
+    sparse.root["accessors"][base]["sparse"] = {
+        {"count", 4000}, {"indices", {{"bufferView", at}, {"componentType", 5123}}}, {"values", {{"bufferView", 0}}}};
+    for (int i = 0; i < 300; ++i) sparse.root["accessors"].push_back(Json(sparse.root["accessors"][base]));
+    EXPECT_EQ(error_of([&] { return sparse.read(); }).code, "E0902");
+}
+
 TEST(GltfMesh, BrokenDracoIsRefused) {
     TestFile file;
     Json& primitive = file.add_mesh({{"POSITION", file.triangle()}});

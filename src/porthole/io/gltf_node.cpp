@@ -150,14 +150,15 @@ std::vector<std::uint32_t> scene_roots(Document& doc, std::span<const Node> node
         roots.push_back(i);
     }
     // A listed node below another listed one would be drawn twice.
+    std::vector<std::uint8_t> covered(nodes.size(), 0);
+    for (const std::uint32_t i : depth_first(nodes, parentless(nodes)))
+        if (const std::int32_t parent = nodes[i].parent; parent != kNone)
+            covered[i] = covered[std::size_t(parent)] | listed[std::size_t(parent)];
     std::erase_if(roots, [&](std::uint32_t i) {
-        if (nodes[i].parent == kNone) return false;
-        bool covered = false;
-        for (std::int32_t k = nodes[i].parent; k != kNone && !covered; k = nodes[std::size_t(k)].parent)
-            covered = listed[std::size_t(k)] != 0;
-        doc.warn("W0305", scenes[scene], "nodes",
-                 "node " + std::to_string(i) + " is no root; it has the parent " + std::to_string(nodes[i].parent));
-        return covered;
+        if (nodes[i].parent != kNone)
+            doc.warn("W0305", scenes[scene], "nodes",
+                     "node " + std::to_string(i) + " is no root; it has the parent " + std::to_string(nodes[i].parent));
+        return covered[i] != 0;
     });
     return roots;
 }
@@ -208,14 +209,19 @@ std::vector<Affine3d> read_instances(const Document& doc, std::span<const Access
     return instances;
 }
 
-std::string name_of(Document& doc, const Json& json) {
-    const Json* value = Document::find(json, "name");
-    if (!value || !value->is_string()) return {}; // check_names has warned
-    std::string name = value->get<std::string>();
-    if (name.find('\0') == name.npos) return name;
-    doc.warn("W0310", json, "name", "has a NUL character; it is read as U+FFFD");
+std::string_view raw_name(const Json& json) {
+    const Json* name = Document::find(json, "name");
+    return name && name->is_string() ? std::string_view(name->get_ref<const std::string&>()) : std::string_view{};
+}
+
+std::string without_nul(std::string_view name) {
     std::string clean;
-    for (const char c : name) clean += c == '\0' ? std::string("\xEF\xBF\xBD") : std::string(1, c);
+    for (const char c : name) {
+        if (c == '\0')
+            clean += "\xEF\xBF\xBD";
+        else
+            clean += c;
+    }
     return clean;
 }
 

@@ -53,7 +53,9 @@ struct Node {
 
 /// Poses the nodes at `time` seconds into the first animation (before its start and after its
 /// end: its first and last key). What cannot be applied is a warning.
-void animate(Document& doc, std::span<const Accessor> accessors, double time, std::vector<Node>& nodes);
+/// @param file_bytes  bounds the keys that are read, which may share bytes only so far.
+void animate(Document& doc, std::span<const Accessor> accessors, double time, std::uint64_t file_bytes,
+             std::vector<Node>& nodes);
 
 /// Value of an animation curve.
 /// @param times   key times, not decreasing, at least one.
@@ -67,8 +69,15 @@ enum class Interpolation { step, linear, cubic };
 [[nodiscard]] std::vector<Affine3d> read_instances(const Document& doc, std::span<const Accessor> accessors,
                                                    const Json& node);
 
-/// Names as they stand in the file; NUL characters, which no path can hold, become U+FFFD
-/// with a warning.
-[[nodiscard]] std::string name_of(Document& doc, const Json& json);
+/// The name in the file; empty without one, or when it is no text (check_names warns).
+[[nodiscard]] std::string_view raw_name(const Json& json);
+/// `name` with NUL characters, which no path can hold, as U+FFFD.
+[[nodiscard]] std::string without_nul(std::string_view name);
+
+// gltf_light.cpp
+
+/// Adds the camera or light of a node to the scene, or a warning if it cannot be used.
+void read_camera(Document& doc, const Node& node, const Affine3d& world, Scene& scene);
+void read_light(Document& doc, const Node& node, const Affine3d& world, Scene& scene);
 
 } // namespace porthole::gltf

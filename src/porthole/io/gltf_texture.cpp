@@ -41,6 +41,11 @@ void read_transform(Document& doc, const Json& info, std::uint64_t& uv_set, Text
 
 } // namespace
 
+TextureReader::TextureReader(Document& doc, std::span<const BufferView> views, UriReader& uris)
+    : doc_(doc), views_(views), uris_(uris), texture_list_(doc.list_of_objects(doc.root(), "textures")),
+      image_list_(doc.list_of_objects(doc.root(), "images")),
+      sampler_list_(doc.list_of_objects(doc.root(), "samplers")) {}
+
 TextureRef TextureReader::read(const Json& object, std::string_view key) {
     TextureRef ref;
     const Json* info = doc_.object(object, key);
@@ -58,7 +63,7 @@ TextureRef TextureReader::read(const Json& object, std::string_view key) {
 }
 
 std::int32_t TextureReader::texture_of(const Json& info) {
-    const std::span<const Json> list = doc_.list_of_objects(doc_.root(), "textures");
+    const std::span<const Json> list = texture_list_;
     const std::uint64_t index = doc_.need_uint(info, "index");
     if (index >= list.size()) {
         doc_.warn("W0303", info, "index",
@@ -72,7 +77,7 @@ std::int32_t TextureReader::texture_of(const Json& info) {
     texture.image = image_of(json);
     std::int32_t& result = texture_by_index_[index];
     if (texture.image == kNone) return result = kNone;
-    const std::span<const Json> samplers = doc_.list_of_objects(doc_.root(), "samplers");
+    const std::span<const Json> samplers = sampler_list_;
     if (const auto sampler = doc_.uint(json, "sampler")) {
         if (*sampler < samplers.size()) {
             const Json& s = samplers[*sampler];
@@ -90,7 +95,7 @@ std::int32_t TextureReader::texture_of(const Json& info) {
 }
 
 std::int32_t TextureReader::image_of(const Json& texture) {
-    const std::span<const Json> list = doc_.list_of_objects(doc_.root(), "images");
+    const std::span<const Json> list = image_list_;
     std::optional<std::uint64_t> source;
     if (const Json* webp = doc_.extension(texture, "EXT_texture_webp")) source = doc_.uint(*webp, "source");
     if (!source) source = doc_.uint(texture, "source");
@@ -112,9 +117,9 @@ std::int32_t TextureReader::image_of(const Json& texture) {
     return known->second;
 }
 
-Bytes TextureReader::bytes_of(const Json& image) const {
+Bytes TextureReader::bytes_of(const Json& image) {
     if (const Json* uri = Document::find(image, "uri"))
-        return read_uri(doc_.string_or(image, "uri"), model_, doc_.where(*uri));
+        return uris_.read(doc_.string_or(image, "uri"), doc_.where(*uri));
     const BufferView& view = views_[doc_.need_index(image, "bufferView", views_.size(), "buffer view")];
     return view.bytes;
 }

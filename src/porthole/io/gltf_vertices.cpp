@@ -40,17 +40,18 @@ std::uint64_t skin_vertices(const Primitive& p, const MeshRequest& request, std:
         read_uints(*p.attributes.joints[s], first, count, joints.data() + s * count * 4);
         read_floats(*p.attributes.weights[s], first, count, 4, weights.data() + s * count * 4);
     }
+    const std::vector<Affine3d>& world_from_bind = *request.world_from_bind;
     std::uint64_t unknown = 0;
     for (std::size_t i = 0; i < count; ++i) {
         Affine3d blend{{}, {}, {}, {}};
         double total = 0;
         bool known = true;
         const auto add = [&](std::uint32_t joint, double w) {
-            if (joint >= request.world_from_bind.size()) {
+            if (joint >= world_from_bind.size()) {
                 joint = 0;
                 known = false;
             }
-            const Affine3d& m = request.world_from_bind[joint];
+            const Affine3d& m = world_from_bind[joint];
             blend.x += m.x * w;
             blend.y += m.y * w;
             blend.z += m.z * w;
