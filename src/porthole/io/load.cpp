@@ -80,9 +80,6 @@ constexpr Foreign kForeign[] = {
     {"OFF\n", 0, "an OFF mesh; convert it to PLY first"},
     {"MM\0*"sv, 0, "a TIFF picture"},
     {"II*\0"sv, 0, "a TIFF picture"},
-    {"MM"sv, 0, "a 3DS file; convert it to glTF first"}, // chunk 0x4D4D
-    {"glTF", 0, nullptr},
-    {"DracoMesh", 0, nullptr},
     {"DRACO", 0, "a bare Draco mesh; pack it into a glTF first"},
     {"n+1\0"sv, 344, "a NIfTI volume; volumes are not read"},
     {"NRRD0", 0, "an NRRD volume; volumes are not read"},
@@ -98,6 +95,14 @@ bool holds(std::string_view bytes, std::size_t at, std::string_view magic) {
     return bytes.size() >= at && bytes.substr(at).starts_with(magic);
 }
 
+/// A 3DS file is one chunk of kind 0x4D4D, its length the file's.
+bool is_3ds(std::string_view bytes) {
+    std::uint32_t length = 0;
+    if (bytes.size() < 6 || !bytes.starts_with("MM")) return false;
+    std::memcpy(&length, bytes.data() + 2, 4);
+    return length == bytes.size();
+}
+
 /// The beginning of a text, without a byte order mark and blanks.
 std::string_view opening(std::string_view bytes) {
     if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
@@ -108,7 +113,8 @@ std::string_view opening(std::string_view bytes) {
 /// What the file is instead of a model that is read; empty if there is no telling.
 std::string foreign_kind(std::string_view bytes) {
     for (const Foreign& f : kForeign)
-        if (f.what && holds(bytes, f.at, f.magic)) return f.what;
+        if (holds(bytes, f.at, f.magic)) return f.what;
+    if (is_3ds(bytes)) return "a 3DS file; convert it to glTF first";
     const std::string start = lower(opening(bytes));
     if (start.starts_with("<!doctype html") || start.starts_with("<html")) return "a web page, not the file behind it";
     if (start.find("<collada") != std::string::npos) return "a COLLADA file; convert it to glTF first";

@@ -11,9 +11,9 @@
 namespace porthole {
 
 struct LoadParams {
-    std::string format;      ///< "glb", "gltf", "obj", "ply", "stl"; empty: told from content and name
-    double time = -1;        ///< seconds into the first animation; negative: rest pose
-    char up = 'y';           ///< axis of the file that points up, 'y' or 'z' (z-up is rotated to y)
+    std::string format;         ///< "glb", "gltf", "obj", "ply", "stl"; empty: told from content and name
+    double time = -1;           ///< seconds into the first animation; negative: rest pose
+    char up = 'y';              ///< axis of the file that points up, 'y' or 'z' (z-up is rotated to y)
     double metres_per_unit = 1; ///< length of the file's unit
     std::uint64_t max_bytes = std::uint64_t(16) << 30; ///< most memory a file may make the reader allocate
 };
@@ -26,8 +26,12 @@ struct LoadParams {
 /// below it, symbolic links resolved. What is left out or repaired is listed in
 /// Scene::warnings.
 ///
-/// @throws Error input (E02xx..E07xx) with file and position; Error limit (E09xx) when
-///         params.max_bytes would be passed; Cancelled.
+/// A file whose name promises another format than its content has is read as what it is, with
+/// warning W0201. Parts of which no triangle is usable are left out, unless all are such.
+///
+/// @throws Error input (E02xx..E07xx) with file and position, E0204 naming what the file is
+///         instead of a model that is read; usage E0120..E0122 for params out of range; limit
+///         (E09xx) when params.max_bytes would be passed; Cancelled.
 /// Cost: linear in the file; decoding and textures run on control.threads threads.
 [[nodiscard]] Scene load_scene(const std::string& path, const LoadParams& params = {}, const Control& control = {});
 

@@ -1,6 +1,7 @@
 #include "porthole/io/mtl.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <tuple>
@@ -162,15 +163,90 @@ template <typename F> Image<Rgba8> combined(const Image<Rgba8>& a, const Image<R
     return out;
 }
 
-/// Adds an image and a texture for it.
-/// @return index of the texture.
-std::int32_t add_texture(Scene& scene, Image<Rgba8> image, bool clamp) {
+/// The pictures that one material's maps name, kNone where there is none.
+struct MapPictures {
+    std::int32_t diffuse = kNone, emissive = kNone, opacity = kNone, roughness = kNone, metallic = kNone,
+                 normal = kNone;
+
+    [[nodiscard]] std::array<std::int32_t, 6> all() const {
+        return {diffuse, emissive, opacity, roughness, metallic, normal};
+    }
+};
+
+/// How a texture is made of one picture or two.
+enum class Recipe : std::uint8_t { plain, opaque, with_opacity, rough_and_metal };
+
+/// Makes the scene's images and textures; materials share those that are made alike.
+class TextureMaker {
+public:
+    TextureMaker(Scene& scene, std::vector<Image<Rgba8>> pictures, const std::vector<MapPictures>& wanted,
+                 const LoadParams& params, std::string path)
+        : scene_(scene), pictures_(std::move(pictures)), uses_(pictures_.size(), 0), params_(params),
+          path_(std::move(path)) {
+        for (const Image<Rgba8>& image : pictures_) readable_.push_back(!image.empty());
+        for (const MapPictures& maps : wanted)
+            for (const std::int32_t i : maps.all())
+                if (i != kNone) ++uses_[std::size_t(i)];
+    }
+
+    /// Whether there is such a picture and it could be read.
+    [[nodiscard]] bool has(std::int32_t i) const { return i != kNone && readable_[std::size_t(i)]; }
+    /// Index of the texture made of pictures a and b, at least one of which can be read.
+    std::int32_t texture(Recipe recipe, const MtlMap& map, std::int32_t a, std::int32_t b = kNone);
+
+private:
+    [[nodiscard]] const Image<Rgba8>& picture(std::int32_t i) const {
+        return i == kNone ? none_ : pictures_[std::size_t(i)];
+    }
+    /// A picture that one map alone uses moves into the scene instead of being copied.
+    Image<Rgba8> take(std::int32_t i) {
+        Image<Rgba8>& image = pictures_[std::size_t(i)];
+        return uses_[std::size_t(i)] == 1 ? std::move(image) : image;
+    }
+    Image<Rgba8> make(Recipe recipe, std::int32_t a, std::int32_t b);
+
+    Scene& scene_;
+    std::vector<Image<Rgba8>> pictures_;
+    std::vector<int> uses_;
+    std::vector<bool> readable_;
+    const LoadParams& params_;
+    std::string path_;
+    Image<Rgba8> none_;
+    std::uint64_t bytes_ = 0; ///< of the images made so far
+    std::map<std::tuple<Recipe, std::int32_t, std::int32_t, bool>, std::int32_t> made_;
+};
+
+Image<Rgba8> TextureMaker::make(Recipe recipe, std::int32_t a, std::int32_t b) {
+    if (recipe == Recipe::plain) return take(a);
+    if (recipe == Recipe::opaque) {
+        Image<Rgba8> image = take(a);
+        for (Rgba8& p : image.pixels()) p.a = 255;
+        return image;
+    }
+    const Image<Rgba8>& first = picture(a);
+    const Image<Rgba8>& second = picture(b);
+    if (recipe == Recipe::with_opacity) {
+        const bool from_alpha = has_alpha(second);
+        return combined(first, second, [&](Rgba8 p, Rgba8 o) {
+            return Rgba8{p.r, p.g, p.b, from_alpha ? o.a : luminance(o)};
+        });
+    }
+    return combined(first, second, [](Rgba8 rough, Rgba8 metal) {
+        return Rgba8{255, luminance(rough), luminance(metal), 255};
+    });
+}
+
+std::int32_t TextureMaker::texture(Recipe recipe, const MtlMap& map, std::int32_t a, std::int32_t b) {
+    const auto [entry, is_new] = made_.try_emplace({recipe, a, b, map.clamp}, std::int32_t(scene_.textures.size()));
+    if (!is_new) return entry->second;
+    scene_.images.push_back(make(recipe, a, b));
+    bytes_ += scene_.images.back().pixels().size() * sizeof(Rgba8);
+    check_memory(bytes_, params_, path_);
     Texture texture;
-    texture.image = std::int32_t(scene.images.size());
-    texture.wrap_u = texture.wrap_v = clamp ? Wrap::clamp : Wrap::repeat;
-    scene.images.push_back(std::move(image));
-    scene.textures.push_back(texture);
-    return std::int32_t(scene.textures.size()) - 1;
+    texture.image = std::int32_t(scene_.images.size()) - 1;
+    texture.wrap_u = texture.wrap_v = map.clamp ? Wrap::clamp : Wrap::repeat;
+    scene_.textures.push_back(texture);
+    return entry->second;
 }
 
 /// In the file v runs up, uv' = scale uv + offset; here v runs down.
@@ -214,6 +290,50 @@ Material factors_of(const MtlMaterial& m, const std::string& where, WarningLog& 
     return material;
 }
 
+/// Nearly only 0 and 1 is a cut-out (leaves, grids), anything else glass or smoke.
+bool is_cut_out(const Image<Rgba8>& image) {
+    const auto between =
+        std::count_if(image.pixels().begin(), image.pixels().end(), [](Rgba8 p) { return p.a > 16 && p.a < 239; });
+    return std::size_t(between) * 20 < image.pixels().size();
+}
+
+/// Gives `material` the textures of `m`, as far as their pictures could be read.
+void add_maps(Material& material, const MtlMaterial& m, const MapPictures& maps, TextureMaker& maker,
+              const Scene& scene) {
+    const bool colored = maker.has(maps.diffuse);
+    if (maker.has(maps.opacity)) {
+        const MtlMap& map = colored ? m.map_diffuse : m.map_opacity;
+        const std::int32_t diffuse = colored ? maps.diffuse : kNone;
+        const std::int32_t texture = maker.texture(Recipe::with_opacity, map, diffuse, maps.opacity);
+        material.base_color_texture = reference(texture, map);
+        const auto image = std::size_t(scene.textures[std::size_t(texture)].image);
+        if (material.alpha_mode == AlphaMode::opaque)
+            material.alpha_mode = is_cut_out(scene.images[image]) ? AlphaMode::mask : AlphaMode::blend;
+    } else if (colored) {
+        material.base_color_texture =
+            reference(maker.texture(Recipe::opaque, m.map_diffuse, maps.diffuse), m.map_diffuse);
+    }
+    // Programs disagree on whether Kd multiplies the texture; black or absent, it cannot.
+    if (colored && (m.diffuse == Vec3f{} || m.diffuse == MtlMaterial{}.diffuse))
+        material.base_color = {1, 1, 1, material.base_color.w};
+    if (maker.has(maps.emissive)) {
+        material.emissive_texture =
+            reference(maker.texture(Recipe::plain, m.map_emissive, maps.emissive), m.map_emissive);
+        if (material.emissive == Vec3f{}) material.emissive = {1, 1, 1};
+    }
+    const bool rough = maker.has(maps.roughness), metal = maker.has(maps.metallic);
+    if (rough || metal) {
+        const MtlMap& map = rough ? m.map_roughness : m.map_metallic;
+        material.metallic_roughness_texture = reference(
+            maker.texture(Recipe::rough_and_metal, map, rough ? maps.roughness : kNone, metal ? maps.metallic : kNone),
+            map);
+        if (rough && !m.roughness) material.roughness = 1;
+        if (metal && !m.metallic) material.metallic = 1;
+    }
+    if (maker.has(maps.normal))
+        material.normal_texture = reference(maker.texture(Recipe::plain, m.map_normal, maps.normal), m.map_normal);
+}
+
 } // namespace
 
 std::vector<MtlMaterial> parse_mtl(std::string_view text, const std::string& path, WarningLog& log) {
@@ -223,94 +343,18 @@ std::vector<MtlMaterial> parse_mtl(std::string_view text, const std::string& pat
 void add_materials(Scene& scene, const std::vector<const MtlMaterial*>& used, const std::filesystem::path& model,
                    const LoadParams& params, const Control& control, WarningLog& log) {
     TextureFiles files(model, params);
-    struct Wanted {
-        std::int32_t diffuse, emissive, opacity, roughness, metallic, normal;
-    };
-    std::vector<Wanted> wanted;
     const auto find = [&](const MtlMap& map) {
         return map.file.empty() ? kNone : files.find(map.file, map.where, log);
     };
+    std::vector<MapPictures> maps;
     for (const MtlMaterial* m : used)
-        wanted.push_back({find(m->map_diffuse), find(m->map_emissive), find(m->map_opacity), find(m->map_roughness),
-                          find(m->map_metallic), find(m->map_normal)});
-    const std::vector<Image<Rgba8>> pictures = files.decode(control, log);
-    const Image<Rgba8> none;
-    const auto picture = [&](std::int32_t i) -> const Image<Rgba8>& {
-        return i == kNone ? none : pictures[std::size_t(i)];
-    };
-
-    // Materials share a texture that is made of the same pictures in the same way.
-    enum class Made : std::uint8_t { plain, opaque, with_opacity, rough_and_metal };
-    std::map<std::tuple<std::int32_t, std::int32_t, Made, bool>, std::int32_t> made;
-    const auto texture = [&](std::int32_t a, std::int32_t b, Made how, const MtlMap& map) {
-        const Image<Rgba8>& first = picture(a);
-        const Image<Rgba8>& second = picture(b);
-        if (first.empty() && second.empty()) return kNone;
-        const auto [entry, is_new] = made.try_emplace({a, b, how, map.clamp}, kNone);
-        if (!is_new) return entry->second;
-        Image<Rgba8> image;
-        switch (how) {
-        case Made::plain: image = first; break;
-        case Made::opaque:
-            image = first;
-            for (Rgba8& p : image.pixels()) p.a = 255;
-            break;
-        case Made::with_opacity: {
-            const bool from_alpha = has_alpha(second);
-            image = combined(first, second, [&](Rgba8 p, Rgba8 o) {
-                return Rgba8{p.r, p.g, p.b, second.empty() ? std::uint8_t(255) : from_alpha ? o.a : luminance(o)};
-            });
-            break;
-        }
-        case Made::rough_and_metal:
-            image = combined(first, second, [&](Rgba8 rough, Rgba8 metal) {
-                return Rgba8{255, luminance(rough), luminance(metal), 255};
-            });
-            break;
-        }
-        std::uint64_t bytes = image.pixels().size() * sizeof(Rgba8);
-        for (const Image<Rgba8>& i : scene.images) bytes += i.pixels().size() * sizeof(Rgba8);
-        check_memory(bytes, params, model.string());
-        return entry->second = add_texture(scene, std::move(image), map.clamp);
-    };
-
+        maps.push_back({find(m->map_diffuse), find(m->map_emissive), find(m->map_opacity), find(m->map_roughness),
+                        find(m->map_metallic), find(m->map_normal)});
+    TextureMaker maker(scene, files.decode(control, log), maps, params, model.string());
     for (std::size_t i = 0; i < used.size(); ++i) {
         const MtlMaterial& m = *used[i];
-        const Wanted& w = wanted[i];
         Material material = factors_of(m, m.where.empty() ? model.string() : m.where, log);
-        const bool cut_out = !picture(w.opacity).empty();
-        const MtlMap& base = !picture(w.diffuse).empty() ? m.map_diffuse : m.map_opacity;
-        if (cut_out) {
-            const std::int32_t t = texture(w.diffuse, w.opacity, Made::with_opacity, base);
-            material.base_color_texture = reference(t, base);
-            // Nearly only 0 and 1 is a cut-out (leaves, grids), anything else glass or smoke.
-            const auto& pixels = scene.images[std::size_t(scene.textures[std::size_t(t)].image)].pixels();
-            const auto between =
-                std::count_if(pixels.begin(), pixels.end(), [](Rgba8 p) { return p.a > 16 && p.a < 239; });
-            if (material.alpha_mode == AlphaMode::opaque)
-                material.alpha_mode = std::size_t(between) * 20 < pixels.size() ? AlphaMode::mask : AlphaMode::blend;
-        } else if (!picture(w.diffuse).empty()) {
-            material.base_color_texture = reference(texture(w.diffuse, kNone, Made::opaque, base), base);
-        }
-        if (!picture(w.diffuse).empty()) {
-            // Programs disagree on whether Kd multiplies the texture; black or absent, it cannot.
-            const float alpha = material.base_color.w;
-            if (m.diffuse == Vec3f{} || m.diffuse == MtlMaterial{}.diffuse) material.base_color = {1, 1, 1, alpha};
-        }
-        if (!picture(w.emissive).empty()) {
-            material.emissive_texture =
-                reference(texture(w.emissive, kNone, Made::plain, m.map_emissive), m.map_emissive);
-            if (material.emissive == Vec3f{}) material.emissive = {1, 1, 1};
-        }
-        if (!picture(w.roughness).empty() || !picture(w.metallic).empty()) {
-            const MtlMap& map = !picture(w.roughness).empty() ? m.map_roughness : m.map_metallic;
-            material.metallic_roughness_texture =
-                reference(texture(w.roughness, w.metallic, Made::rough_and_metal, map), map);
-            if (!picture(w.roughness).empty() && !m.roughness) material.roughness = 1;
-            if (!picture(w.metallic).empty() && !m.metallic) material.metallic = 1;
-        }
-        if (!picture(w.normal).empty())
-            material.normal_texture = reference(texture(w.normal, kNone, Made::plain, m.map_normal), m.map_normal);
+        add_maps(material, m, maps[i], maker, scene);
         scene.materials.push_back(std::move(material));
     }
 }

@@ -1,7 +1,8 @@
 #include "porthole/io/reader.h"
 
 #include <algorithm>
-#include <optional>
+#include <type_traits>
+#include <utility>
 
 #include "porthole/base/tone.h"
 #include "porthole/io/files.h"
@@ -118,36 +119,34 @@ std::int32_t TextureFiles::find(std::string_view reference, const std::string& w
 
 std::vector<Image<Rgba8>> TextureFiles::decode(const Control& control, WarningLog& log) const {
     struct Decoded {
-        std::optional<FileBytes> file;
         Image<Rgba8> image;
         Warnings warnings;
+        bool readable = true;
     };
     std::vector<Decoded> decoded(entries_.size());
     const auto attempt = [&](std::size_t i, const auto& step) {
         const std::string where = entries_[i].where + ": " + valid_utf8(entries_[i].file.filename().string());
         try {
-            step(where);
+            step(FileBytes(entries_[i].file), where);
         } catch (const Error& error) {
             decoded[i].warnings.push_back({"W0702", where, std::string("texture left out: ") + error.what()});
-            decoded[i].file.reset();
+            decoded[i].readable = false;
         }
     };
 
     // All sizes first: whether memory suffices must not depend on the order of decoding.
     std::uint64_t bytes = 0;
     for (std::size_t i = 0; i < entries_.size(); ++i)
-        attempt(i, [&](const std::string& where) {
-            decoded[i].file.emplace(entries_[i].file);
-            const ImageInfo info = image_info(decoded[i].file->bytes(), where);
+        attempt(i, [&](const FileBytes& file, const std::string& where) {
+            const ImageInfo info = image_info(file.bytes(), where);
             bytes += std::uint64_t(info.width) * std::uint64_t(info.height) * sizeof(Rgba8);
         });
     check_memory(bytes, *params_, model_.string());
     parallel_for(entries_.size(), control, [&](std::size_t i) {
-        if (!decoded[i].file) return;
-        attempt(i, [&](const std::string& where) {
-            decoded[i].image = decode_image(decoded[i].file->bytes(), where, &decoded[i].warnings);
+        if (!decoded[i].readable) return;
+        attempt(i, [&](const FileBytes& file, const std::string& where) {
+            decoded[i].image = decode_image(file.bytes(), where, &decoded[i].warnings);
         });
-        decoded[i].file.reset();
     });
 
     std::vector<Image<Rgba8>> images;
