@@ -74,7 +74,9 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
 
     revealed.report = measure(subject, revealed.plan, opened, plain,
                               revealed.plan.nothing_revealed() ? plain : revealed.frame, control);
-    revealed.report.camera = is_auto(params.camera) ? "auto" : params.camera.name;
+    revealed.report.camera = is_auto(params.camera)              ? "auto"
+                             : params.camera.name == "auto" ? "custom"
+                                                            : params.camera.name;
     revealed.report.run.plan = planned;
     revealed.report.run.render = rendered;
     revealed.report.run.threads = thread_count(control);

@@ -58,6 +58,15 @@ bool has_area(Vec3f a, Vec3f b, Vec3f c) {
 MeshRepair finish_mesh(Mesh& mesh) {
     MeshRepair repair;
     const std::size_t vertices = mesh.positions.size();
+    const auto corners_usable = [&](Vec3u t) {
+        return t.x < vertices && t.y < vertices && t.z < vertices && usable(mesh.positions[t.x]) &&
+               usable(mesh.positions[t.y]) && usable(mesh.positions[t.z]);
+    };
+    // Needles without area are never hit, but their edges close the surface: they stay, unless
+    // there is nothing else.
+    const bool any_area = std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](Vec3u t) {
+        return corners_usable(t) && has_area(mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]);
+    });
 
     std::vector<Submesh> kept;
     std::size_t out = 0;
@@ -65,16 +74,12 @@ MeshRepair finish_mesh(Mesh& mesh) {
         Submesh run{static_cast<std::uint32_t>(out), 0, s.material};
         for (std::uint32_t i = 0; i < s.triangle_count; ++i) {
             const Vec3u t = mesh.triangles[s.first_triangle + i];
-            if (t.x >= vertices || t.y >= vertices || t.z >= vertices) {
+            if (!corners_usable(t)) {
                 ++repair.non_finite;
                 continue;
             }
             const Vec3f a = mesh.positions[t.x], b = mesh.positions[t.y], c = mesh.positions[t.z];
-            if (!usable(a) || !usable(b) || !usable(c)) {
-                ++repair.non_finite;
-                continue;
-            }
-            if (t.x == t.y || t.y == t.z || t.z == t.x || !has_area(a, b, c)) {
+            if (a == b || b == c || c == a || !any_area) {
                 ++repair.degenerate;
                 continue;
             }

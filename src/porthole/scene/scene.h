@@ -132,7 +132,7 @@ struct Scene {
 [[nodiscard]] std::uint64_t triangle_count(const Scene& scene); ///< over parts: a shared mesh counts each time
 
 /// Puts a freshly read mesh in order: drops triangles with a non-finite, out-of-range or
-/// repeated corner or without area, computes bounds, reserves Embree's padding, fixes the
+/// repeated corner, and all triangles when none has any area, computes bounds, reserves Embree's padding, fixes the
 /// submeshes. Every reader calls it.
 /// @return how many triangles were dropped for (a) non-finite vertices, (b) no area.
 struct MeshRepair {

@@ -228,9 +228,12 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
     std::string config = "threads=" + std::to_string(threads);
     if (params.isa != "native") config += ",isa=" + params.isa;
     state->device = DeviceHandle(rtcNewDevice(config.c_str()));
-    if (!state->device.value)
-        throw Error(ErrorKind::usage, "E0105", "--isa",
-                    "this processor cannot run '" + params.isa + "'; try --isa native");
+    if (!state->device.value) {
+        if (rtcGetDeviceError(nullptr) == RTC_ERROR_UNSUPPORTED_CPU)
+            throw Error(ErrorKind::usage, "E0105", "--isa",
+                        "this processor cannot run '" + params.isa + "'; try --isa native");
+        throw Error(ErrorKind::limit, "E0902", "build", "the ray tracer could not start: too little memory or threads");
+    }
     state->meshes.resize(scene.meshes.size());
     state->kinds.resize(scene.meshes.size());
     state->hashes.resize(scene.meshes.size());

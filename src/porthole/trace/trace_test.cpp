@@ -199,5 +199,32 @@ TEST(Trace, CutRemovesForShadowRays) {
     EXPECT_TRUE(is_occluded({0, 0, 0}, {1, 0, 0}, &cut));
 }
 
+TEST(Trace, ReflectedRayThatStartsOnARemovedSurfaceGoesOn) {
+    // A hit at t = 0 is skipped by the next representable t, which is denormal and flushed.
+    Builder b;
+    b.add_box("wall", {0, 0, 0}, {1, 1, 1});
+    b.add_box("behind", {0, 0, -4}, {1, 1, 1});
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Bvh bvh = build_bvh(meshes, all_parts(b.scene));
+    Cut cut;
+    cut.view = view_from({0, 0, 6}, 64, 64);
+    cut.distance = Image<float>(cut.view.window(), -1.0f);
+    cut.cut_depth = Image<float>(cut.view.window(), 7.5f);
+    cut.loose_depth = Image<float>(cut.view.window(), -kInfinity);
+    cut.role = {CutRole::cut_set, CutRole::fixed};
+    auto found = std::async(std::launch::async, [&] {
+        const FlushDenormals flush;
+        RayHit16 rays;
+        for (int i = 0; i < kLanes; ++i) rays.clear(i);
+        rays.set(5, {0.1f, 0.2f, 1}, {0, 0, -1}, 0, kInfinity);
+        intersect_cut(bvh, rays, 5, &cut);
+        return std::pair{rays.part(5), rays.tfar[5]};
+    });
+    ASSERT_EQ(found.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+    const auto [part, t] = found.get();
+    EXPECT_EQ(part, PartId{1});
+    EXPECT_NEAR(t, 4.0f, 1e-5f);
+}
+
 } // namespace
 } // namespace porthole
