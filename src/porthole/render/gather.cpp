@@ -63,7 +63,7 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
     }
     if (picture.params.shading == Shading::flat || n == 0) return;
     std::array<Vec3f, kLanes> lamps;
-    occlusion.lamps(std::span(points.data(), n), lamps.data(), rays);
+    occlusion.lamps(std::span(points.data(), n), kLampRays, lamps.data(), rays);
     for (std::size_t k = 0; k < n; ++k) {
         Pixel& pixel = buffer.pixels(pixels[k].x, pixels[k].y);
         for (int c = 0; c < 3; ++c) pixel.lamps[c] = std::uint8_t(std::lround(clamp01(lamps[k][c]) * 255.0f));

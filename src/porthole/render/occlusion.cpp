@@ -6,7 +6,7 @@ namespace porthole {
 
 namespace {
 
-constexpr int kDiscPoints = 16;
+constexpr int kDiscPoints = kCellPixels * kLampRays;
 constexpr int kLoneLampRays = 4; // of the 16 rays of a lone point
 constexpr int kLoneAmbientRays = kLanes - kLoneLampRays;
 constexpr float kGrazing = 0.01f;
@@ -44,19 +44,22 @@ bool Occlusion::lamp_ray(const Lamp& lamp, std::size_t index, const Asker& p, in
     return true;
 }
 
-void Occlusion::lamps(std::span<const Asker> points, Vec3f* shares, RayCounts& rays) const {
+void Occlusion::lamps(std::span<const Asker> points, int each, Vec3f* shares, RayCounts& rays) const {
     for (std::size_t i = 0; i < points.size(); ++i) shares[i] = {1, 1, 1};
     if (!shadows_) return;
     Vec3f reached[kLanes];
     float all[kLanes] = {};
-    for (std::size_t l = 0; l < lighting_->lamps.size(); ++l) {
+    for (std::size_t l = 0; l < lighting_->lamps.size() * std::size_t(each); ++l) {
+        const std::size_t lamp = l / std::size_t(each);
+        // The spiral's inner half, then its outer one.
+        const int shift = int(l % std::size_t(each)) * kCellPixels;
         float weight[kLanes] = {};
         Vec3f direction[kLanes];
         float tfar[kLanes] = {};
         bool asks[kLanes] = {};
         bool asks_in[2] = {false, false};
         for (std::size_t i = 0; i < points.size(); ++i) {
-            asks[i] = lamp_ray(lighting_->lamps[l], l, points[i], points[i].pattern, direction[i], tfar[i], weight[i]);
+            asks[i] = lamp_ray(lighting_->lamps[lamp], lamp, points[i], points[i].pattern + shift, direction[i], tfar[i], weight[i]);
             if (asks[i]) asks_in[points[i].in_hole ? 1 : 0] = true;
         }
         for (const bool in_hole : {false, true}) {

@@ -18,13 +18,17 @@ struct Asker {
     int pattern = 0; ///< which part of the patterns it traces, any number >= 0
 };
 
+/// Shadow rays of a pixel centre and lamp.
+inline constexpr int kLampRays = 2;
+
 /// Traces occlusion for one picture. Holds references; const use is thread-safe.
 class Occlusion {
 public:
     Occlusion(const Bvh& bvh, const Cut* cut, const Lighting& lighting, const RenderParams& params);
 
-    /// Share of the lamps' light that reaches up to 16 points, one ray a point and lamp.
-    void lamps(std::span<const Asker> points, Vec3f* shares, RayCounts& rays) const;
+    /// Share of the lamps' light that reaches up to 16 points.
+    /// @param each  rays a point and lamp, 1 or kLampRays; those of a point's pattern.
+    void lamps(std::span<const Asker> points, int each, Vec3f* shares, RayCounts& rays) const;
 
     /// Sums over ambient rays: what is open, and what would be.
     struct Ambient {

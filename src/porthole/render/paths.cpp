@@ -262,7 +262,7 @@ void Shader::reach_of(std::span<const Asker> points, Reach* reach) {
     }
     std::array<Vec3f, kLanes> lamps;
     std::array<Occlusion::Ambient, kLanes> ambient;
-    occlusion.lamps(points, lamps.data(), *rays_);
+    occlusion.lamps(points, 1, lamps.data(), *rays_);
     occlusion.ambient(points, ambient.data(), *rays_);
     for (std::size_t i = 0; i < points.size(); ++i) reach[i] = {lamps[i], ambient[i].share()};
 }

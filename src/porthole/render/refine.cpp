@@ -85,7 +85,7 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
     }
     if (n == 0) return;
     std::array<Vec3f, kLanes> lamps;
-    stage.occlusion.lamps(std::span(askers.data(), n), lamps.data(), rays);
+    stage.occlusion.lamps(std::span(askers.data(), n), 1, lamps.data(), rays);
     for (std::size_t k = 0; k < n; ++k) {
         const std::size_t i = lane_of[k];
         const Reach reach = ambient[k] >= 0 ? Reach{lamps[k], ambient[k]} : stage.occlusion.reach(askers[k], rays);
