@@ -1,8 +1,7 @@
 // A folder of its own for a test's files, removed at the end.
 #pragma once
 
-#include <stdlib.h>
-
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -28,7 +27,7 @@ public:
     [[nodiscard]] const std::filesystem::path& path() const { return path_; }
     /// Writes a file, and the folders it lies in.
     std::filesystem::path write(const std::string& name, std::string_view content) const {
-        const std::filesystem::path file = path_ / name;
+        std::filesystem::path file = path_ / name;
         std::filesystem::create_directories(file.parent_path());
         std::ofstream out(file, std::ios::binary);
         out.write(content.data(), std::streamsize(content.size()));

@@ -236,7 +236,7 @@ fs::path resolve_beside(const fs::path& model, std::string_view reference, const
                                             "and name it without a path");
         const fs::path wanted = (folder / name).lexically_normal();
         if (!lies_in(wanted, folder)) refuse_reference(where, shown + " leaves the model's folder and is not read");
-        const fs::path real = fs::canonical(wanted, failure);
+        fs::path real = fs::canonical(wanted, failure);
         if (failure) continue;
         if (!lies_in(real, folder))
             refuse_reference(where, shown + " is a link that leaves the model's folder and is not read");

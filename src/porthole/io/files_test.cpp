@@ -189,6 +189,7 @@ TEST(WriteFile, OneOfManyWritersWinsWithNoClobber) {
     std::atomic<int> written{0};
     {
         std::vector<std::jthread> writers;
+        writers.reserve(8);
         for (int i = 0; i < 8; ++i)
             writers.emplace_back([&, i] {
                 const std::string content(1000, char('a' + i));

@@ -222,6 +222,7 @@ std::vector<Rgba8> png_palette(png_structp png, png_infop info) {
     if (!png_get_PLTE(png, info, &colours, &colour_count)) return {};
     if (!png_get_tRNS(png, info, &alpha, &alpha_count, nullptr)) alpha_count = 0;
     std::vector<Rgba8> palette;
+    palette.reserve(std::size_t(colour_count));
     for (int i = 0; i < colour_count; ++i)
         palette.push_back(
             {colours[i].red, colours[i].green, colours[i].blue, i < alpha_count ? alpha[i] : std::uint8_t(255)});

@@ -347,6 +347,7 @@ void add_materials(Scene& scene, const std::vector<const MtlMaterial*>& used, co
         return map.file.empty() ? kNone : files.find(map.file, map.where, log);
     };
     std::vector<MapPictures> maps;
+    maps.reserve(used.size());
     for (const MtlMaterial* m : used)
         maps.push_back({find(m->map_diffuse), find(m->map_emissive), find(m->map_opacity), find(m->map_roughness),
                         find(m->map_metallic), find(m->map_normal)});

@@ -253,6 +253,7 @@ void report_faults(const ObjData& data, const std::string& path, WarningLog& log
     };
     tell("W0401", data.bad_vertices, "a vertex has no three finite numbers, faces with it are left out");
     tell("W0402", data.bad_faces, "face left out");
+    tell("W0406", data.huge_faces, "an unlikely face, drawn all the same");
     tell("W0403", data.bad_references, "texture coordinate or normal left out");
     tell("W0405", data.not_drawn, "points, lines and free-form surfaces are not drawn");
     tell("W0407", data.commands, "commands in a model are never run");

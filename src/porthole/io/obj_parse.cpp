@@ -253,6 +253,8 @@ void ObjParser::face() {
     if (names_later_vertex_) data_.early.emplace_back(face_index, line);
     data_.corners.insert(data_.corners.end(), face_.begin(), face_.end());
     data_.face_end.push_back(static_cast<std::uint32_t>(data_.corners.size()));
+    constexpr std::size_t kHuge = 10000;
+    if (face_.size() >= kHuge) data_.huge_faces.note(line, std::to_string(face_.size()) + " corners");
     // A line of any length must not pass the limits between two checks.
     if (face_.size() > 65536) check();
 }

@@ -45,7 +45,7 @@ struct ObjData {
     std::vector<std::pair<std::string, std::uint64_t>> libraries; ///< mtllib's text and line
     std::vector<std::pair<std::uint32_t, std::uint64_t>> early;   ///< faces (and lines) that name vertices yet to come
     std::uint64_t face_statements = 0, known_statements = 0;
-    Fault bad_vertices, bad_faces, bad_references, unknown, not_drawn, commands;
+    Fault bad_vertices, bad_faces, huge_faces, bad_references, unknown, not_drawn, commands;
 
     [[nodiscard]] std::uint64_t bytes() const;                     ///< memory held
     [[nodiscard]] std::uint64_t line_of(std::uint32_t face) const; ///< 0 if not among `early`

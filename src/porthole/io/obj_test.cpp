@@ -1,6 +1,6 @@
 #include "porthole/io/obj.h"
 
-#include <map>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -89,9 +89,11 @@ TEST(Obj, IndicesMayBeNegativeOrComeFirst) {
 }
 
 TEST(Obj, BadFacesAreLeftOutAndNamed) {
-    for (const std::string bad : {"f 1 2 9", "f 1 2 0", "f 1 2 -9", "f 1 2 99999999999999999999", "f 1 2 4294967297",
-                                  "f 1 2", "f", "f 1 2 x", "f 1 2 3x", "f 1 2 3.5", "f 1 2 3/1/1/1", "f 1,2,3"}) {
-        const Scene scene = read(kQuad + "f 1 2 3\n" + bad + "\n");
+    for (const char* bad : {"f 1 2 9", "f 1 2 0", "f 1 2 -9", "f 1 2 99999999999999999999", "f 1 2 4294967297", "f 1 2",
+                            "f", "f 1 2 x", "f 1 2 3x", "f 1 2 3.5", "f 1 2 3/1/1/1", "f 1,2,3"}) {
+        std::string model = kQuad + "f 1 2 3\n";
+        model += bad;
+        const Scene scene = read(std::move(model));
         EXPECT_EQ(triangle_count(scene), 1u) << bad;
         ASSERT_EQ(codes(scene), std::vector<std::string>{"W0402"}) << bad;
         EXPECT_EQ(scene.warnings[0].where, "model.obj:6") << bad;
@@ -132,13 +134,30 @@ TEST(Obj, WhatIsNotDrawnIsSaid) {
     EXPECT_EQ(codes(read(kTriangle + "l 1 2\np 1\n")), std::vector<std::string>{"W0405"});
     EXPECT_EQ(codes(read("csh -touch pwned\n" + kTriangle + "call other.obj\n")), std::vector<std::string>{"W0407"});
     EXPECT_EQ(codes(read(kTriangle + "frobnicate 1\n")), std::vector<std::string>{"W0408"});
-    EXPECT_EQ(codes(read(kTriangle + "v 2 0 0\nf 1 2 4\n")), std::vector<std::string>{"W0404"}); // no area
+    EXPECT_EQ(codes(read(kTriangle + "f 1 2 2\n")), std::vector<std::string>{"W0404"}); // no area
+}
+
+TEST(Obj, AHugePolygonIsDrawnWithAWarning) {
+    std::string model, face = "f";
+    for (int i = 0; i < 20000; ++i) {
+        const double a = 2 * double(kPi) * i / 20000;
+        model += "v " + std::to_string(std::cos(a)) + " " + std::to_string(std::sin(a)) + " 0\n";
+        face += " " + std::to_string(i + 1);
+    }
+    const Scene scene = read(model + face);
+    EXPECT_EQ(codes(scene), std::vector<std::string>{"W0406"});
+    double area = 0;
+    const Mesh& mesh = scene.meshes[0];
+    for (const Vec3u t : mesh.triangles)
+        area +=
+            double(cross(mesh.positions[t.y] - mesh.positions[t.x], mesh.positions[t.z] - mesh.positions[t.x]).z) / 2;
+    EXPECT_NEAR(area, double(kPi), 1e-3);
 }
 
 TEST(Obj, OtherFilesAreRefused) {
     EXPECT_EQ(code_of("This is a letter,\nnot a model.\n"), "E0401 model.obj:1");
     EXPECT_EQ(code_of(std::string("v 1\0 2", 6)), "E0402 model.obj:byte 3");
-    EXPECT_EQ(code_of("\xFE\xFF\0v"), "E0402 model.obj");
+    EXPECT_EQ(code_of(std::string("\xFE\xFF\0v", 4)), "E0402 model.obj");
     EXPECT_TRUE(read("# only a comment\n").parts.empty());
     EXPECT_TRUE(read(kQuad).parts.empty());
 }
