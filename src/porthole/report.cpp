@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "porthole/hole/distance.h"
 #include "porthole/hole/metrics.h"
 
 namespace porthole {
@@ -119,7 +120,32 @@ TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const 
     return r;
 }
 
-PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, const Frame& before, const Frame& after) {
+/// Share of the covered contour pixels that have the inside of a cut part within the depth.
+std::optional<double> wall_visible(const Subject& subject, const ViewPlan& plan, const Frame& after,
+                                   const Control& control) {
+    const Rect window = plan.hole.window.intersected(after.ids.window());
+    Mask band(window, 0);
+    Image<float> from(window), seen(window);
+    for (int y = window.y0; y < window.y1; ++y)
+        for (int x = window.x0; x < window.x1; ++x) {
+            const PartId id = after.ids.id(x, y);
+            band(x, y) = plan.hole.mask(x, y) && id != kNoPart && plan.cut.role[index(id)] == CutRole::cut_set;
+            from(x, y) = plan.cut.cut_depth(x, y);
+            seen(x, y) = after.ids.depth(x, y);
+        }
+    const Bvh cut_set = build_bvh(*subject.meshes, plan.cut_set);
+    const Mask behind = trace_back_faces(cut_set, plan.view, band, from, seen, control);
+    std::vector<Vec2i> covered;
+    for (const BandPixel& c : plan.hole.band)
+        if (c.covered && window.contains(c.pixel.x, c.pixel.y)) covered.push_back(c.pixel);
+    const std::vector<std::int64_t> distances = squared_distances(behind, covered);
+    const std::int64_t reach = std::int64_t(plan.depth_px) * plan.depth_px;
+    return ratio(std::count_if(distances.begin(), distances.end(), [&](std::int64_t d) { return d <= reach; }),
+                 std::int64_t(covered.size()));
+}
+
+PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, const Frame& before, const Frame& after,
+                              const Control& control) {
     PictureReport r;
     const Image<PartId>&w = before.ids.id, &o = after.ids.id;
     r.outline_iou = outline_iou(w, o);
@@ -140,6 +166,7 @@ PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, cons
         const Rect box = plan.hole.window.intersected(w.window());
         for (int y = box.y0; y < box.y1; ++y)
             for (int x = box.x0; x < box.x1; ++x) r.hole_pixels += plan.hole.mask(x, y);
+        r.wall_visible = wall_visible(subject, plan, after, control);
     }
     return r;
 }
@@ -154,7 +181,6 @@ nlohmann::ordered_json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
 
 Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, const Frame& before, const Frame& after,
                const Control& control) {
-    (void)control;
     const Scene& scene = subject.scene();
     Report report;
     report.parts = std::int64_t(scene.parts.size());
@@ -174,7 +200,7 @@ Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, con
                                            "'; targets never cut each other: ask for one of them"});
     }
     for (const PartId id : plan.cut_set) report.cut_parts.push_back(scene.parts[index(id)].path);
-    report.picture = measure_picture(subject, plan, before, after);
+    report.picture = measure_picture(subject, plan, before, after, control);
     report.plan_rays = plan.rays;
     report.frame_rays = before.rays;
     report.frame_rays.primary += plan.cut.empty() ? 0 : after.rays.primary;

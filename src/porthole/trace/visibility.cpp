@@ -350,6 +350,36 @@ Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Imag
     return beyond;
 }
 
+Mask trace_back_faces(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from,
+                      const Image<float>& until, const Control& control) {
+    Mask behind(mask.window(), 0);
+    parallel_for_tiles(mask.window(), kTile, control, [&](Rect tile) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        for_each_block(tile, [&](int x0, int y0) {
+            set_block_rays(packet, depth_per_t, view, x0, y0, tile);
+            for (int i = 0; i < kLanes; ++i) {
+                if (!packet.active(i)) continue;
+                const int x = x0 + (i & 3), y = y0 + (i >> 2);
+                if (mask(x, y) && from(x, y) < kInfinity) packet.tnear[i] = std::max(0.0f, from(x, y) / depth_per_t[i]);
+                else packet.clear(i);
+            }
+            intersect(bvh, packet, Coherence::coherent);
+            for (int i = 0; i < kLanes; ++i) {
+                if (!packet.hit(i)) continue;
+                const int x = x0 + (i & 3), y = y0 + (i >> 2);
+                const Affine3f a(bvh.scene().parts[index(packet.part(i))].world_from_mesh);
+                const Vec3f normal = transform_normal(a, Vec3f{packet.ng_x[i], packet.ng_y[i], packet.ng_z[i]});
+                const float facing = dot(normal, packet.direction(i)) * a.determinant();
+                // Two computations of one surface may differ in their last bits.
+                const float limit = until(x, y) * (1 + 8 * std::numeric_limits<float>::epsilon());
+                behind(x, y) = facing > 0 && packet.tfar[i] * depth_per_t[i] <= limit;
+            }
+        });
+    });
+    return behind;
+}
+
 FineCoverage trace_fine(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
     FineCoverage fine;
     fine.hits = Image<std::uint16_t>(window, 0);

@@ -80,6 +80,11 @@ struct Spans {
 [[nodiscard]] Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from,
                                 const Control& control = {}, std::int64_t* rays = nullptr);
 
+/// At the pixels of `mask` whether the nearest surface of `bvh` at depth `from` or beyond is one
+/// seen from behind, by its mesh's winding, and no farther than `until`; 0 outside the mask.
+[[nodiscard]] Mask trace_back_faces(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from,
+                                    const Image<float>& until, const Control& control = {});
+
 /// Hits of a target in the 16 sub-pixel positions (4x4 grid) of each pixel of `window`, for
 /// targets too small for pixel centres.
 struct FineCoverage {
