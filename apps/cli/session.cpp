@@ -48,8 +48,9 @@ Scene load(const CommonOptions& options, Output& out, const Control& control) {
 }
 
 void require_parts(const Scene& scene) {
-    if (scene.parts.empty() || triangle_count(scene) == 0)
-        throw Error(ErrorKind::input, "E0204", scene.source, "holds no triangles: there is nothing to draw");
+    // A model whose triangles all lack area has parts, a warning, and an empty picture.
+    if (scene.parts.empty())
+        throw Error(ErrorKind::input, "E0206", scene.source, "holds no triangles: there is nothing to draw");
 }
 
 void fill_report(Report& report, const char* command, const Scene& scene, const PictureOptions& picture) {

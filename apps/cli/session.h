@@ -34,7 +34,7 @@ void limit_memory(const CommonOptions& options);
 /// Reads the model and says so: its warnings go to `out` too.
 [[nodiscard]] Scene load(const CommonOptions& options, Output& out, const Control& control);
 
-/// @throws Error input E0204 when there is nothing to draw.
+/// @throws Error input E0206 when there is nothing to draw.
 void require_parts(const Scene& scene);
 
 /// What every report says of the program, the model and the run.

@@ -2,6 +2,7 @@
 // refer to each other by index; a Scene is a plain value, constant once loaded.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -72,7 +73,7 @@ struct Mesh {
     std::vector<Vec3u> triangles; ///< indices below positions.size()
     std::vector<Vec3f> normals;   ///< unit length; empty: shaded flat
     std::vector<Vec4f> tangents;  ///< xyz unit length, w = handedness
-    std::vector<Vec2f> uv[2];
+    std::array<std::vector<Vec2f>, 2> uv;
     std::vector<Vec4f> colors; ///< linear, multiplies base_color
     std::vector<Submesh> submeshes; ///< in order, covering every triangle once
     Bounds3f bounds;
