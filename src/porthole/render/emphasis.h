@@ -9,12 +9,14 @@
 
 namespace porthole {
 
-/// Distance of two linear colours as seen, in OKLab units (black to white is 1).
+/// How differently two linear colours catch the eye: distance in OKLab with lightness at
+/// half weight, because light and shadow change it anyway. Black to white is 0.5.
 [[nodiscard]] float color_distance(Vec3f a, Vec3f b);
 
 /// The tint of every part, for its pixels that see it as a target through the hole. With
-/// Emphasis::accent a target keeps its colour, more saturated, if that is distinct from the
-/// mean colour of what is seen in and around the hole; else it gets the accent colour.
+/// Emphasis::accent a target keeps its colour, more saturated, if that is distinct from what
+/// is seen in and around the hole: far from the mean colour, and from all but a few of the
+/// pixels. Else it gets an accent colour: orange, or azure where that stands out far more.
 /// Cost: one material lookup for every fourth pixel of the buffer. One thread.
 [[nodiscard]] std::vector<Tint> target_tints(const Scene& scene, const std::vector<Placement>& placements,
                                              const GBuffer& buffer, Emphasis emphasis);

@@ -8,7 +8,6 @@ namespace porthole {
 
 namespace {
 
-constexpr Vec3f kAccent{0.95f, 0.36f, 0.06f};
 constexpr float kAccentShare = 0.85f;
 constexpr float kSaturation = 1.35f;
 constexpr float kSmoothest = 0.03f;
@@ -43,6 +42,15 @@ Vec3f bulge(const Vec3f (&corner)[3], const Vec3f (&normal)[3], const float (&we
 Vec3f saturated(Vec3f color, float factor) {
     const float grey = 0.2126f * color.x + 0.7152f * color.y + 0.0722f * color.z;
     return max(Vec3f{grey, grey, grey} + (color - Vec3f{grey, grey, grey}) * factor, Vec3f{0, 0, 0});
+}
+
+Vec3f tinted(Vec3f color, Tint tint) {
+    switch (tint.kind) {
+    case Tint::Kind::saturate: return saturated(color, kSaturation);
+    case Tint::Kind::accent: return lerp(color, tint.accent, kAccentShare);
+    case Tint::Kind::none: break;
+    }
+    return color;
 }
 
 std::vector<Placement> make_placements(const Scene& scene) {
@@ -120,9 +128,7 @@ Substance substance(const Scene& scene, const Placement& placement, const Hit& h
 
     Substance s;
     s.material = &m;
-    s.color = rgb(base);
-    if (tint.kind == Tint::Kind::saturate) s.color = saturated(s.color, kSaturation);
-    if (tint.kind == Tint::Kind::accent) s.color = lerp(s.color, kAccent, kAccentShare);
+    s.color = tinted(rgb(base), tint);
     s.coverage = m.alpha_mode == AlphaMode::blend ? clamp01(base.w) : 1.0f;
     s.emission = m.emissive;
     if (m.emissive_texture.texture >= 0) s.emission = s.emission * rgb(look_up(m.emissive_texture, Encoding::srgb));

@@ -59,6 +59,7 @@ struct Substance {
 /// How the colour of an emphasised part is changed.
 struct Tint {
     enum class Kind : std::uint8_t { none, saturate, accent } kind = Kind::none;
+    Vec3f accent{0.95f, 0.36f, 0.06f}; ///< linear
 };
 
 /// Matte albedo is kept within these: what is darker reads as a hole, what is lighter clips.
@@ -73,5 +74,8 @@ inline constexpr float kDarkest = 0.03f, kLightest = 0.85f;
 
 /// `color` with its distance from grey multiplied; not below zero.
 [[nodiscard]] Vec3f saturated(Vec3f color, float factor);
+
+/// The base colour that a part of this colour has under `tint`.
+[[nodiscard]] Vec3f tinted(Vec3f color, Tint tint);
 
 } // namespace porthole
