@@ -100,10 +100,10 @@ TEST(GltfAccessor, BoundsAreChecked) {
         const Error e = error_of([&] { return file.read(); });
         return e.code + " " + e.where;
     };
-    const auto accessor = [](const char* key, Json value) {
+    const auto accessor = [](const char* key, const Json& value) {
         return [=](TestFile& f) { f.root["accessors"][0][key] = value; };
     };
-    const auto view = [](const char* key, Json value) {
+    const auto view = [](const char* key, const Json& value) {
         return [=](TestFile& f) { f.root["bufferViews"][0][key] = value; };
     };
     EXPECT_EQ(code_with([](TestFile&) {}), "none ");

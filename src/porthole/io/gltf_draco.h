@@ -1,7 +1,6 @@
 // KHR_draco_mesh_compression.
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -18,7 +17,9 @@ struct DracoAttribute {
     std::uint32_t id = 0;
     bool normalized = false;
 
-    friend auto operator<=>(const DracoAttribute&, const DracoAttribute&) = default;
+    friend bool operator<(DracoAttribute a, DracoAttribute b) {
+        return a.id != b.id ? a.id < b.id : a.normalized < b.normalized;
+    }
 };
 
 struct DracoMesh {

@@ -26,7 +26,8 @@ struct MaterialSet {
 /// read is a warning and an empty image.
 /// @throws Error E0303; limit E0902 when the images pass params.max_bytes; Cancelled.
 [[nodiscard]] MaterialSet read_materials(Document& doc, std::span<const std::uint8_t> used,
-                                         std::span<const BufferView> views, UriReader& uris, const LoadParams& params, const Control& control);
+                                         std::span<const BufferView> views, UriReader& uris, const LoadParams& params,
+                                         const Control& control);
 
 /// Collects the textures that materials use, then decodes their images.
 class TextureReader {
