@@ -55,7 +55,7 @@ void compare_row(Planes& p, int row, int dx, int dy) {
         for (int c = 0; c < 4; ++c) most = std::max(most, std::abs(p.color[c][row][i] - p.color[c][row + dy][o]));
         const std::int32_t a = p.key[row][i], b = p.key[row + dy][o];
         most = a == b ? most : 1.0f;
-        p.step[row][i] = (a == kOutside) | (b == kOutside) ? 0.0f : most;
+        p.step[row][i] = ((a == kOutside) | (b == kOutside)) ? 0.0f : most;
     }
 }
 

@@ -97,7 +97,8 @@ struct FineCoverage {
 
 /// Continuous pixel position of sub-sample `i` (0..15) of pixel (x, y) in trace_fine.
 [[nodiscard]] inline Vec2f fine_position(int x, int y, int i) {
-    return {float(x) + (float(i % 4) + 0.5f) * 0.25f, float(y) + (float(i / 4) + 0.5f) * 0.25f};
+    const int row = i / 4, column = i % 4;
+    return {float(x) + (float(column) + 0.5f) * 0.25f, float(y) + (float(row) + 0.5f) * 0.25f};
 }
 
 } // namespace porthole
