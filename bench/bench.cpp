@@ -66,7 +66,8 @@ Stage& stage(const Named& named) {
 }
 
 void count_rays(benchmark::State& state) {
-    state.counters["Mrays/s"] = benchmark::Counter(double(kWidth) * kHeight / 1e6, benchmark::Counter::kIsIterationInvariantRate);
+    state.counters["Mrays/s"] =
+        benchmark::Counter(double(kWidth) * kHeight / 1e6, benchmark::Counter::kIsIterationInvariantRate);
 }
 
 void bare_packets(benchmark::State& state, const Named& named) {
@@ -85,8 +86,10 @@ void target_ids(benchmark::State& state, const Named& named, bool blocks_only) {
     const Stage& s = stage(named);
     for (auto _ : state) {
         if (blocks_only) {
-            const BlockMask blocks = mark_blocks(s.scene, s.subject->targets, s.subject->boxes, s.view, s.view.window());
-            benchmark::DoNotOptimize(trace_ids_in_blocks(s.subject->target_bvh, s.view, s.view.window(), blocks, s.one_thread));
+            const BlockMask blocks =
+                mark_blocks(s.scene, s.subject->targets, s.subject->boxes, s.view, s.view.window());
+            benchmark::DoNotOptimize(
+                trace_ids_in_blocks(s.subject->target_bvh, s.view, s.view.window(), blocks, s.one_thread));
         } else {
             benchmark::DoNotOptimize(trace_ids(s.subject->target_bvh, s.view, s.view.window(), s.one_thread));
         }

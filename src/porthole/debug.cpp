@@ -67,7 +67,8 @@ Image<Rgba8> drawn_widths(const ViewPlan& plan) {
     Image<Rgba8> out(plan.window, {30, 30, 30, 255});
     for (const BandPixel& c : plan.hole.band) {
         const float share = plan.depth_px > 0 ? std::clamp(c.width_px / float(plan.depth_px), 0.0f, 1.0f) : 0.0f;
-        out(c.pixel.x, c.pixel.y) = {std::uint8_t(255 - std::lround(175 * share)), std::uint8_t(80 + std::lround(175 * share)), 80, 255};
+        out(c.pixel.x, c.pixel.y) = {std::uint8_t(255 - std::lround(175 * share)),
+                                     std::uint8_t(80 + std::lround(175 * share)), 80, 255};
     }
     return out;
 }

@@ -27,8 +27,7 @@ template <typename T, typename Set> Rect bounding_rect(const Image<T>& image, Se
 template <typename T> Image<T> cropped(const Image<T>& image, Rect window) {
     if (window == image.window()) return image;
     Image<T> out(window);
-    for (int y = window.y0; y < window.y1; ++y)
-        std::copy_n(&image(window.x0, y), window.width(), out.row(y));
+    for (int y = window.y0; y < window.y1; ++y) std::copy_n(&image(window.x0, y), window.width(), out.row(y));
     return out;
 }
 
@@ -104,9 +103,12 @@ void find_hiding_targets(std::vector<TargetView>& targets, const IdBuffer& ids) 
             for (int x = box.x0; x < box.x1; ++x) {
                 const PartId id = ids.id(x, y);
                 if (!target.alone(x, y) || id == target.part || id == kNoPart) continue;
-                const auto it = std::find_if(hiders.begin(), hiders.end(), [&](const auto& h) { return h.first == id; });
-                if (it == hiders.end()) hiders.emplace_back(id, 1);
-                else ++it->second;
+                const auto it =
+                    std::find_if(hiders.begin(), hiders.end(), [&](const auto& h) { return h.first == id; });
+                if (it == hiders.end())
+                    hiders.emplace_back(id, 1);
+                else
+                    ++it->second;
             }
         for (const auto& [id, n] : hiders)
             if (2 * n > target.pixels_alone + target.pixels_outside) target.hidden_by = id;
@@ -204,8 +206,8 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     find_hiding_targets(plan.targets, plan.target_ids);
 
     // What lies in front of the targets is cut; the rest is loose.
-    plan.spans = trace_spans(subject.whole, kMaskCutSet, view, plan.target_ids, subject.tolerance(), control,
-                             &plan.rays.spans);
+    plan.spans =
+        trace_spans(subject.whole, kMaskCutSet, view, plan.target_ids, subject.tolerance(), control, &plan.rays.spans);
     for (const PartSpan& span : plan.spans.parts) plan.cut_set.push_back(span.part);
     if (plan.cut_set.empty()) return;
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
@@ -254,13 +256,13 @@ Subject make_subject(const MeshBvhs& meshes, std::span<const PartId> targets, st
     Bvh whole = build_bvh(meshes, all_parts(scene), roles);
     Bvh target_bvh = build_bvh(meshes, sorted);
     ClusterBoxes boxes = cluster_boxes(scene, sorted, control);
-    return {&meshes, std::move(sorted), std::move(roles), std::move(whole), std::move(target_bvh),
+    return {&meshes,          std::move(sorted),  std::move(roles), std::move(whole), std::move(target_bvh),
             std::move(boxes), scene_bounds(scene)};
 }
 
 int band_depth_px(const Subject& subject, const View& view, const PlanParams& params) {
-    const Length depth = params.depth.value_or(params.style == HoleStyle::paper ? Length{Length::Unit::pixel, 4}
-                                                                               : Length{});
+    const Length depth =
+        params.depth.value_or(params.style == HoleStyle::paper ? Length{Length::Unit::pixel, 4} : Length{});
     double px = depth.value;
     if (depth.unit == Length::Unit::percent) px = depth.value / 100 * view.height;
     if (depth.unit == Length::Unit::millimetre) {

@@ -49,12 +49,12 @@ struct PlanParams {
 /// MeshBvhs alive.
 struct Subject {
     const MeshBvhs* meshes = nullptr;
-    std::vector<PartId> targets;    ///< increasing
-    std::vector<CutRole> roles;     ///< by part: fixed (targets, kept parts) or cut_set (may be cut)
-    Bvh whole;                      ///< every part, with those roles as masks
-    Bvh target_bvh;                 ///< the targets only
-    ClusterBoxes boxes;             ///< of the targets
-    Bounds3d bounds;                ///< of every part
+    std::vector<PartId> targets; ///< increasing
+    std::vector<CutRole> roles;  ///< by part: fixed (targets, kept parts) or cut_set (may be cut)
+    Bvh whole;                   ///< every part, with those roles as masks
+    Bvh target_bvh;              ///< the targets only
+    ClusterBoxes boxes;          ///< of the targets
+    Bounds3d bounds;             ///< of every part
     [[nodiscard]] const Scene& scene() const { return meshes->scene(); }
     [[nodiscard]] float tolerance() const { return float(1e-6 * bounds.diagonal()); }
 };
@@ -68,20 +68,20 @@ struct Subject {
 /// Where one target alone would be seen.
 struct TargetView {
     PartId part = kNoPart;
-    Mask alone;                     ///< 1 at pixel centres (or, if thin, pixels with a sub-pixel sample) it covers
-    std::int64_t pixels_alone = 0;  ///< of those, inside the picture
+    Mask alone;                      ///< 1 at pixel centres (or, if thin, pixels with a sub-pixel sample) it covers
+    std::int64_t pixels_alone = 0;   ///< of those, inside the picture
     std::int64_t pixels_outside = 0; ///< of those, in the margin around the picture
-    std::int64_t fine_samples = 0;  ///< thin targets: sub-pixel samples that hit, inside the picture
-    bool thin = false;              ///< under 16 pixels: seen through sub-pixel samples
-    bool absent = false;            ///< no sample hits it
-    bool refused = false;           ///< no room for a hole
-    PartId hidden_by = kNoPart;     ///< another target that covers over half of its pixels
+    std::int64_t fine_samples = 0;   ///< thin targets: sub-pixel samples that hit, inside the picture
+    bool thin = false;               ///< under 16 pixels: seen through sub-pixel samples
+    bool absent = false;             ///< no sample hits it
+    bool refused = false;            ///< no room for a hole
+    PartId hidden_by = kNoPart;      ///< another target that covers over half of its pixels
 };
 
 struct ViewPlan {
     View view;
-    int depth_px = 0;   ///< width of the band asked for
-    Rect window;        ///< the part of picture and margin that the hole can touch; all images below
+    int depth_px = 0;                ///< width of the band asked for
+    Rect window;                     ///< the part of picture and margin that the hole can touch; all images below
     std::vector<TargetView> targets; ///< in the order of Subject::targets
     std::vector<PartId> opened;      ///< targets neither absent nor refused
     IdBuffer target_ids;             ///< opened targets only

@@ -60,8 +60,10 @@ TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const 
     r.depth_asked_px = plan.depth_px;
     if (target.pixels_alone + target.pixels_outside > 0)
         r.off_image_share = double(target.pixels_outside) / double(target.pixels_alone + target.pixels_outside);
-    if (target.absent) r.refused = "absent";
-    else if (target.refused) r.refused = "no room";
+    if (target.absent)
+        r.refused = "absent";
+    else if (target.refused)
+        r.refused = "no room";
 
     const Rect box = target.alone.window().intersected(before.ids.window());
     std::int64_t seen_before = 0, seen_after = 0, among = 0, among_seen = 0;
@@ -86,7 +88,8 @@ TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const 
     }
 
     for (const Contour& contour : plan.contours) {
-        const bool own = !contour.pixels.empty() && plan.target_ids.id(contour.pixels[0].x, contour.pixels[0].y) == target.part;
+        const bool own =
+            !contour.pixels.empty() && plan.target_ids.id(contour.pixels[0].x, contour.pixels[0].y) == target.part;
         if (!own) continue;
         r.components += contour.outer;
         r.closed = r.closed && contour.closed;
@@ -189,8 +192,7 @@ Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, con
     report.nothing_to_cut = plan.nothing_to_cut();
 
     std::vector<float> rings;
-    if (!plan.hole.empty())
-        rings = ring_shares(plan.hole, plan.target_ids, after.ids, subject.roles, plan.depth_px);
+    if (!plan.hole.empty()) rings = ring_shares(plan.hole, plan.target_ids, after.ids, subject.roles, plan.depth_px);
     for (const TargetView& target : plan.targets) {
         report.targets.push_back(measure_target(subject, plan, bvh, target, rings, before, after));
         if (target.hidden_by != kNoPart)
@@ -242,10 +244,14 @@ std::string to_json(const Report& report) {
              {"closed", t.closed},
              {"covered", json_of(t.covered)},
              {"clearance_px",
-              {{"min", json_of(t.clearance_min_px)}, {"p5", json_of(t.clearance_p5_px)}, {"mean", json_of(t.clearance_mean_px)}}},
+              {{"min", json_of(t.clearance_min_px)},
+               {"p5", json_of(t.clearance_p5_px)},
+               {"mean", json_of(t.clearance_mean_px)}}},
              {"depth_asked_px", t.depth_asked_px},
              {"depth_used_px",
-              {{"min", json_of(t.depth_used_min_px)}, {"mean", json_of(t.depth_used_mean_px)}, {"max", json_of(t.depth_used_max_px)}}},
+              {{"min", json_of(t.depth_used_min_px)},
+               {"mean", json_of(t.depth_used_mean_px)},
+               {"max", json_of(t.depth_used_max_px)}}},
              {"ring", {{"mean", json_of(t.ring_mean)}, {"p5", json_of(t.ring_p5)}, {"min", json_of(t.ring_min)}}},
              {"off_image_share", t.off_image_share},
              {"thin", t.thin},
@@ -253,27 +259,41 @@ std::string to_json(const Report& report) {
     j["targets"] = targets;
     j["cut_parts"] = report.cut_parts;
     const PictureReport& p = report.picture;
-    j["picture"] = {{"outline_iou", json_of(p.outline_iou)},   {"see_through_px", p.see_through_px},
+    j["picture"] = {{"outline_iou", json_of(p.outline_iou)},         {"see_through_px", p.see_through_px},
                     {"context_removed", json_of(p.context_removed)}, {"parts_lost", p.parts_lost},
-                    {"wall_visible", json_of(p.wall_visible)}, {"hole_pixels", p.hole_pixels}};
+                    {"wall_visible", json_of(p.wall_visible)},       {"hole_pixels", p.hole_pixels}};
 
     const ViewPlan::Rays& r = report.plan_rays;
     const RayCounts& f = report.frame_rays;
-    const std::int64_t primary = f.primary + r.targets + r.alone + r.enclosing + r.spans + r.loose + r.paper_step1 + r.paper_step2;
+    const std::int64_t primary =
+        f.primary + r.targets + r.alone + r.enclosing + r.spans + r.loose + r.paper_step1 + r.paper_step2;
     const std::int64_t all = primary + f.shadow + f.ambient + f.reflection + f.refraction;
-    j["rays"] = {{"targets", r.targets},         {"targets_alone", r.alone},   {"spans", r.spans},
-                 {"enclosing", r.enclosing},     {"loose", r.loose},           {"paper_step1", r.paper_step1},
-                 {"paper_step2", r.paper_step2}, {"primary", f.primary},       {"shadow", f.shadow},
-                 {"ambient", f.ambient},         {"reflection", f.reflection}, {"refraction", f.refraction},
+    j["rays"] = {{"targets", r.targets},
+                 {"targets_alone", r.alone},
+                 {"spans", r.spans},
+                 {"enclosing", r.enclosing},
+                 {"loose", r.loose},
+                 {"paper_step1", r.paper_step1},
+                 {"paper_step2", r.paper_step2},
+                 {"primary", f.primary},
+                 {"shadow", f.shadow},
+                 {"ambient", f.ambient},
+                 {"reflection", f.reflection},
+                 {"refraction", f.refraction},
                  {"primary_share", all ? Json(double(primary) / double(all)) : Json(nullptr)}};
 
     Json warnings = Json::array();
-    for (const Warning& w : report.warnings) warnings.push_back({{"code", w.code}, {"where", w.where}, {"reason", w.reason}});
+    for (const Warning& w : report.warnings)
+        warnings.push_back({{"code", w.code}, {"where", w.where}, {"reason", w.reason}});
     j["warnings"] = warnings;
     const RunReport& run = report.run;
     j["run"] = {{"seconds",
-                 {{"load", run.load}, {"build", run.build}, {"plan", run.plan}, {"render", run.render},
-                  {"write", run.write}, {"total", run.total}}},
+                 {{"load", run.load},
+                  {"build", run.build},
+                  {"plan", run.plan},
+                  {"render", run.render},
+                  {"write", run.write},
+                  {"total", run.total}}},
                 {"threads", run.threads},
                 {"isa", run.isa},
                 {"peak_bytes", run.peak_bytes}};

@@ -18,8 +18,8 @@ struct TargetReport {
     std::int64_t pixels_alone = 0; ///< inside the picture; thin targets: pixels with a sub-pixel sample
     std::optional<double> visible_before, visible_after, visible_among_targets;
     std::int64_t contour_pixels = 0;
-    int components = 0; ///< outer borders that belong to it
-    bool closed = true; ///< all of its borders are
+    int components = 0;            ///< outer borders that belong to it
+    bool closed = true;            ///< all of its borders are
     std::optional<double> covered; ///< share of its contour pixels that an occluder hides
     std::optional<double> clearance_min_px, clearance_p5_px, clearance_mean_px; ///< null: infinite
     int depth_asked_px = 0;
@@ -32,8 +32,8 @@ struct TargetReport {
 
 struct PictureReport {
     std::optional<double> outline_iou, context_removed, wall_visible;
-    std::int64_t see_through_px = 0; ///< model before, nothing after
-    std::int64_t hole_pixels = 0;    ///< targets and band, inside the picture
+    std::int64_t see_through_px = 0;     ///< model before, nothing after
+    std::int64_t hole_pixels = 0;        ///< targets and band, inside the picture
     std::vector<std::string> parts_lost; ///< seen before, nowhere after
 };
 
@@ -48,7 +48,7 @@ struct Report {
     std::string version, command, model_path;
     std::int64_t parts = 0, triangles = 0;
     View view;
-    std::string camera;       ///< what was asked for
+    std::string camera; ///< what was asked for
     bool nothing_to_cut = false;
     std::vector<TargetReport> targets;
     std::vector<std::string> cut_parts; ///< paths of the parts that were cut

@@ -74,7 +74,7 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
 
     revealed.report = measure(subject, revealed.plan, opened, plain,
                               revealed.plan.nothing_revealed() ? plain : revealed.frame, control);
-    revealed.report.camera = is_auto(params.camera)              ? "auto"
+    revealed.report.camera = is_auto(params.camera)         ? "auto"
                              : params.camera.name == "auto" ? "custom"
                                                             : params.camera.name;
     revealed.report.run.plan = planned;

@@ -13,11 +13,11 @@
 namespace porthole {
 
 struct RevealParams {
-    std::vector<PartId> targets;  ///< parts that must be seen
-    std::vector<PartId> keep;     ///< parts that stay whole
-    std::vector<PartId> cut_only; ///< if not empty, only these may be cut
+    std::vector<PartId> targets;   ///< parts that must be seen
+    std::vector<PartId> keep;      ///< parts that stay whole
+    std::vector<PartId> cut_only;  ///< if not empty, only these may be cut
     bool keep_see_through = false; ///< blended and transmissive parts stay whole too
-    CameraParams camera;          ///< name "auto": chosen by the plan
+    CameraParams camera;           ///< name "auto": chosen by the plan
     int width = 1920, height = 1080;
     PlanParams plan;
     RenderParams render;

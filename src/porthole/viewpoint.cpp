@@ -59,9 +59,12 @@ double ViewScore::value(std::int64_t largest_area) const {
 double pose_of(Vec3f toward_eye) {
     const double elevation = std::asin(std::clamp(double(toward_eye.y), -1.0, 1.0)) * 180 / double(kPi);
     double liked = 1;
-    if (elevation < -1e-3) liked = 0.5;
-    else if (elevation < 5) liked = 0.75 + 0.05 * elevation;
-    else if (elevation > 50) liked = 1 - 0.75 * (elevation - 50) / 40;
+    if (elevation < -1e-3)
+        liked = 0.5;
+    else if (elevation < 5)
+        liked = 0.75 + 0.05 * elevation;
+    else if (elevation > 50)
+        liked = 1 - 0.75 * (elevation - 50) / 40;
     if (toward_eye.z < -1e-3f) liked *= 0.85;
     const double along_axis = std::max({std::abs(toward_eye.x), std::abs(toward_eye.y), std::abs(toward_eye.z)});
     return liked * (0.7 + 0.3 * std::clamp((1 - along_axis) / 0.15, 0.0, 1.0));

@@ -16,6 +16,6 @@ inline std::filesystem::path shared_folder() {
 
 } // namespace porthole::test
 
-#define PORTHOLE_NEEDS_SHARED(folder)                                                     \
-    const std::filesystem::path folder = ::porthole::test::shared_folder();               \
+#define PORTHOLE_NEEDS_SHARED(folder)                                       \
+    const std::filesystem::path folder = ::porthole::test::shared_folder(); \
     if (folder.empty()) GTEST_SKIP() << "needs the shared models: set PORTHOLE_SHARED"

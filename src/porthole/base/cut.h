@@ -21,9 +21,9 @@ enum class CutRole : std::uint8_t {
 /// All images share one window, which covers every pixel of the hole and one more around.
 struct Cut {
     View view;
-    Image<float> distance;    ///< signed distance to the hole's rim, pixels; <= 0 inside
-    Image<float> cut_depth;   ///< metres along camera -z; geometry of the cut set nearer than this is gone
-    Image<float> loose_depth; ///< the same for loose parts; -infinity where nothing of the cut set was removed
+    Image<float> distance;     ///< signed distance to the hole's rim, pixels; <= 0 inside
+    Image<float> cut_depth;    ///< metres along camera -z; geometry of the cut set nearer than this is gone
+    Image<float> loose_depth;  ///< the same for loose parts; -infinity where nothing of the cut set was removed
     std::vector<CutRole> role; ///< by part id
 
     [[nodiscard]] bool empty() const { return distance.empty(); }

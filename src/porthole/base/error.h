@@ -10,11 +10,11 @@ namespace porthole {
 
 /// What kind of failure; the command line maps it to an exit code.
 enum class ErrorKind {
-    usage,     ///< exit 2: arguments that cannot be meant
-    input,     ///< exit 3: a file that cannot be read as what it claims to be
-    output,    ///< exit 4: a result that cannot be written
-    limit,     ///< exit 5: memory, time or size
-    bug        ///< exit 1
+    usage,  ///< exit 2: arguments that cannot be meant
+    input,  ///< exit 3: a file that cannot be read as what it claims to be
+    output, ///< exit 4: a result that cannot be written
+    limit,  ///< exit 5: memory, time or size
+    bug     ///< exit 1
 };
 
 /// Thrown at public entry points, never in pixel loops.
@@ -36,7 +36,7 @@ public:
 
 /// Something was left out or repaired; the result stands.
 struct Warning {
-    std::string code;  ///< "W0102"
+    std::string code; ///< "W0102"
     std::string where;
     std::string reason;
 };

@@ -32,7 +32,8 @@ template <typename T> class Image {
 public:
     Image() = default;
     explicit Image(Rect window, T fill = T{})
-        : window_(window), pixels_(window.empty() ? 0 : std::size_t(window.width()) * std::size_t(window.height()), fill) {}
+        : window_(window),
+          pixels_(window.empty() ? 0 : std::size_t(window.width()) * std::size_t(window.height()), fill) {}
     Image(std::int32_t width, std::int32_t height, T fill = T{}) : Image(Rect{0, 0, width, height}, fill) {}
 
     [[nodiscard]] Rect window() const { return window_; }

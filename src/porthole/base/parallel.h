@@ -13,9 +13,9 @@ namespace porthole {
 
 /// Handed last to long functions.
 struct Control {
-    std::stop_token stop;                                            ///< asks for an early, clean end
+    std::stop_token stop;                                               ///< asks for an early, clean end
     std::function<void(std::string_view stage, double share)> progress; ///< called from any thread; share in [0, 1]
-    int threads = 0;                                                 ///< 0: one per processor
+    int threads = 0;                                                    ///< 0: one per processor
 };
 
 /// Thrown by long functions when `Control::stop` was requested.

@@ -9,7 +9,7 @@ namespace porthole {
 
 struct Ray {
     Vec3f origin;
-    Vec3f direction; ///< unit length
+    Vec3f direction;       ///< unit length
     float depth_per_t = 1; ///< depth (metres along camera -z) of a point at t: t * depth_per_t
 };
 

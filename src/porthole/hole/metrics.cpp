@@ -16,8 +16,10 @@ std::vector<float> ring_shares(const Hole& hole, const IdBuffer& targets, const 
     for (int y = window.y0; y < window.y1; ++y)
         for (int x = window.x0; x < window.x1; ++x) {
             const PartId id = opened.id(x, y);
-            if (targets.id(x, y) != kNoPart) blocking(x, y) = -1;
-            else if (id != kNoPart && roles[index(id)] != CutRole::fixed) blocking(x, y) = opened.depth(x, y);
+            if (targets.id(x, y) != kNoPart)
+                blocking(x, y) = -1;
+            else if (id != kNoPart && roles[index(id)] != CutRole::fixed)
+                blocking(x, y) = opened.depth(x, y);
         }
 
     std::vector<int> half_width(std::size_t(depth_px) + 1);
@@ -30,7 +32,8 @@ std::vector<float> ring_shares(const Hole& hole, const IdBuffer& targets, const 
         // The floor is smoothed over the band, so the last part in a thousand does not count.
         const float limit = targets.depth(c.pixel.x, c.pixel.y) * (1 - 1e-3f);
         int counted = 0, clear = 0;
-        for (int y = std::max(c.pixel.y - depth_px, window.y0); y <= std::min(c.pixel.y + depth_px, window.y1 - 1); ++y) {
+        for (int y = std::max(c.pixel.y - depth_px, window.y0); y <= std::min(c.pixel.y + depth_px, window.y1 - 1);
+             ++y) {
             const int half = half_width[std::size_t(std::abs(y - c.pixel.y))];
             const int x0 = std::max(c.pixel.x - half, window.x0), x1 = std::min(c.pixel.x + half, window.x1 - 1);
             const float* row = &blocking(x0, y);

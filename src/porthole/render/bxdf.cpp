@@ -37,7 +37,8 @@ Vec3f ggx(Vec3f f0, float alpha, Vec3f n, Vec3f wi, Vec3f wo) {
     const float a2 = alpha * alpha;
     const float d = nh * nh * (a2 - 1.0f) + 1.0f;
     const float distribution = a2 / (kPi * d * d);
-    const float visibility = 0.5f / (nl * std::sqrt(nv * nv * (1.0f - a2) + a2) + nv * std::sqrt(nl * nl * (1.0f - a2) + a2));
+    const float visibility =
+        0.5f / (nl * std::sqrt(nv * nv * (1.0f - a2) + a2) + nv * std::sqrt(nl * nl * (1.0f - a2) + a2));
     return fresnel_schlick(f0, dot(wi, h)) * (distribution * visibility);
 }
 
@@ -60,12 +61,14 @@ LobeAlbedo integrate_lobe(float roughness, float cosine) {
     double scale = 0, bias = 0;
     for (int i = 0; i < kSamples; ++i) {
         const float u = (float(i) + 0.5f) / kSamples, phi = 2 * kPi * radical_inverse(std::uint32_t(i));
-        const float nh = std::sqrt((1.0f - u) / (1.0f + (a2 - 1.0f) * u)), sh = std::sqrt(std::max(0.0f, 1.0f - nh * nh));
+        const float nh = std::sqrt((1.0f - u) / (1.0f + (a2 - 1.0f) * u)),
+                    sh = std::sqrt(std::max(0.0f, 1.0f - nh * nh));
         const Vec3f h{sh * std::cos(phi), sh * std::sin(phi), nh};
         const float vh = dot(wo, h);
         const float nl = 2.0f * vh * nh - nv;
         if (!(nl > 0) || !(vh > 0)) continue;
-        const float smith = 0.5f / (nl * std::sqrt(nv * nv * (1.0f - a2) + a2) + nv * std::sqrt(nl * nl * (1.0f - a2) + a2));
+        const float smith =
+            0.5f / (nl * std::sqrt(nv * nv * (1.0f - a2) + a2) + nv * std::sqrt(nl * nl * (1.0f - a2) + a2));
         const double weight = double(smith) * 4.0 * double(vh) * double(nl) / double(nh);
         const double fresnel = std::pow(1.0 - double(vh), 5.0);
         scale += (1.0 - fresnel) * weight;

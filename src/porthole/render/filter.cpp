@@ -66,8 +66,7 @@ struct Sums {
     alignas(64) float lamps[3][FilteredTile::kSize], weight[FilteredTile::kSize];
 };
 
-template <int kChannels>
-void add_neighbours(const Planes& p, int row, int dx, int dy, float weight, Sums& sums) {
+template <int kChannels> void add_neighbours(const Planes& p, int row, int dx, int dy, float weight, Sums& sums) {
     const int other = row + dy;
     for (int i = 0; i < FilteredTile::kSize; ++i) {
         const int a = i + kApron, b = a + dx;
@@ -98,8 +97,10 @@ void filter_tile(const GBuffer& buffer, const View& view, Rect tile, FilteredTil
         for (int dy = -kApron; dy <= kApron; ++dy)
             for (int dx = -kApron; dx <= kApron; ++dx) {
                 const float weight = (std::abs(dx) == kApron ? 0.5f : 1.0f) * (std::abs(dy) == kApron ? 0.5f : 1.0f);
-                if (content.colored) add_neighbours<3>(*planes, y + kApron, dx, dy, weight, sums);
-                else add_neighbours<1>(*planes, y + kApron, dx, dy, weight, sums);
+                if (content.colored)
+                    add_neighbours<3>(*planes, y + kApron, dx, dy, weight, sums);
+                else
+                    add_neighbours<1>(*planes, y + kApron, dx, dy, weight, sums);
             }
         const int first = y * FilteredTile::kSize;
         for (int i = 0; i < FilteredTile::kSize; ++i) {

@@ -15,7 +15,9 @@ bool near_hole(const Cut& cut, int x, int y, int reach) {
     return false;
 }
 
-std::uint16_t quantised(float value, float unit) { return std::uint16_t(std::lround(std::min(value * unit, 65535.0f))); }
+std::uint16_t quantised(float value, float unit) {
+    return std::uint16_t(std::lround(std::min(value * unit, 65535.0f)));
+}
 
 /// Points of one tile that ask for light, with the pixel each belongs to.
 struct Askers {
@@ -24,8 +26,8 @@ struct Askers {
 };
 
 /// Camera rays, geometry and lamps of one block of 4x4 pixels.
-void gather_block(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile, int bx,
-                  int by, Askers& askers, RayCounts& rays) {
+void gather_block(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile,
+                  int bx, int by, Askers& askers, RayCounts& rays) {
     GBuffer& buffer = picture.buffer;
     Samples16 samples;
     bool any = false;
@@ -112,7 +114,8 @@ Rect hole_window(const Cut& cut, const View& view) {
     for (int y = w.y0; y < w.y1; ++y)
         for (int x = w.x0; x < w.x1; ++x) {
             if (cut.distance(x, y) > 0) continue;
-            found = {std::min(found.x0, x), std::min(found.y0, y), std::max(found.x1, x + 1), std::max(found.y1, y + 1)};
+            found = {std::min(found.x0, x), std::min(found.y0, y), std::max(found.x1, x + 1),
+                     std::max(found.y1, y + 1)};
         }
     if (found.empty()) return {};
     found = found.grown(1 + kLightMargin);

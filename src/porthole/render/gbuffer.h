@@ -1,8 +1,8 @@
 // What pixel centres see and what light reaches them, kept between the passes of a picture.
 #pragma once
 
-#include <cstdint>
 #include <cmath>
+#include <cstdint>
 
 #include "porthole/base/ids.h"
 #include "porthole/render/occlusion.h"
@@ -18,7 +18,9 @@ namespace porthole {
         y = (1.0f - std::abs(x)) * (y < 0 ? -1.0f : 1.0f);
         x = fx;
     }
-    const auto quantised = [](float v) { return static_cast<std::uint32_t>(std::lround((v * 0.5f + 0.5f) * 65535.0f)); };
+    const auto quantised = [](float v) {
+        return static_cast<std::uint32_t>(std::lround((v * 0.5f + 0.5f) * 65535.0f));
+    };
     return quantised(x) | quantised(y) << 16;
 }
 [[nodiscard]] inline Vec3f unpack_normal(std::uint32_t packed) {
@@ -45,9 +47,9 @@ struct Pixel {
     };
     std::uint32_t triangle = 0;
     float u = 0, v = 0;
-    std::uint32_t normal = 0;                      ///< smooth, packed
+    std::uint32_t normal = 0;                        ///< smooth, packed
     std::uint16_t ambient_open = 0, ambient_all = 0; ///< of Occlusion::Ambient, 65535 / rays a unit
-    std::uint8_t lamps[3] = {255, 255, 255};       ///< share of the lamps' light, one ray a lamp
+    std::uint8_t lamps[3] = {255, 255, 255};         ///< share of the lamps' light, one ray a lamp
     std::uint8_t flags = 0;
 
     [[nodiscard]] bool has(Flag f) const { return (flags & f) != 0; }

@@ -24,8 +24,8 @@ Occlusion::Occlusion(const Bvh& bvh, const Cut* cut, const Lighting& lighting, c
     for (int i = 0; i < kLoneAmbientRays; ++i) lone_.push_back(many[std::size_t(i * 4 + 2)]);
 }
 
-bool Occlusion::lamp_ray(const Lamp& lamp, std::size_t index, const Asker& p, int pattern, Vec3f& direction, float& tfar,
-                         float& weight) const {
+bool Occlusion::lamp_ray(const Lamp& lamp, std::size_t index, const Asker& p, int pattern, Vec3f& direction,
+                         float& tfar, float& weight) const {
     const Incident in = incident(lamp, p.position);
     weight = lamp_weight(in, p.normal);
     if (!(weight > 0)) return false;
@@ -59,7 +59,8 @@ void Occlusion::lamps(std::span<const Asker> points, int each, Vec3f* shares, Ra
         bool asks[kLanes] = {};
         bool asks_in[2] = {false, false};
         for (std::size_t i = 0; i < points.size(); ++i) {
-            asks[i] = lamp_ray(lighting_->lamps[lamp], lamp, points[i], points[i].pattern + shift, direction[i], tfar[i], weight[i]);
+            asks[i] = lamp_ray(lighting_->lamps[lamp], lamp, points[i], points[i].pattern + shift, direction[i],
+                               tfar[i], weight[i]);
             if (asks[i]) asks_in[points[i].in_hole ? 1 : 0] = true;
         }
         for (const bool in_hole : {false, true}) {
@@ -164,7 +165,8 @@ Reach Occlusion::reach(const Asker& p, RayCounts& rays) const {
             for (int k = 0; k < each; ++k) {
                 Vec3f direction;
                 float tfar = 0;
-                if (!lamp_ray(lighting_->lamps[l], l, p, k * (kDiscPoints / kLoneLampRays) + 1, direction, tfar, weight[lanes]))
+                if (!lamp_ray(lighting_->lamps[l], l, p, k * (kDiscPoints / kLoneLampRays) + 1, direction, tfar,
+                              weight[lanes]))
                     continue;
                 packet.set(lanes, p.start, direction, 0, tfar);
                 all_lamps += weight[lanes++];
@@ -183,8 +185,10 @@ Reach Occlusion::reach(const Asker& p, RayCounts& rays) const {
     Vec3f lit{0, 0, 0};
     for (int i = 0; i < lanes; ++i) {
         if (!(packet.tfar[i] > 0)) continue;
-        if (i < ambient_lanes) open += weight[i];
-        else lit += tint[i] * weight[i];
+        if (i < ambient_lanes)
+            open += weight[i];
+        else
+            lit += tint[i] * weight[i];
     }
     if (all_ambient > 0) reach.ambient = open / all_ambient;
     if (all_lamps > 0) reach.lamps = lit / all_lamps;

@@ -53,9 +53,9 @@ private:
     const Lighting* lighting_;
     bool shadows_;
     int ambient_rays_;
-    bool tinted_;                        ///< some surfaces tint the light that passes
-    std::vector<AmbientRay> pattern_;    ///< of a cell of pixels
-    std::vector<AmbientRay> lone_;       ///< of a single point
+    bool tinted_;                     ///< some surfaces tint the light that passes
+    std::vector<AmbientRay> pattern_; ///< of a cell of pixels
+    std::vector<AmbientRay> lone_;    ///< of a single point
     std::vector<Vec2f> disc_;
     std::vector<Frame3> lamp_frames_;
 };

@@ -76,15 +76,19 @@ Vec4f display_color(const Radiance& r, Vec3f background) {
 
 void Shader::push(const PathRay& ray) {
     if (largest(ray.weight) < least_weight(ray)) return;
-    if (ray.bounce <= stage_->params.max_bounces) queue_.push_back(ray);
-    else end_in_surroundings(ray); // where it would have gone on: bright rather than black
+    if (ray.bounce <= stage_->params.max_bounces)
+        queue_.push_back(ray);
+    else
+        end_in_surroundings(ray); // where it would have gone on: bright rather than black
 }
 
 void Shader::end_in_surroundings(const PathRay& ray) {
     Radiance& sum = radiance_[ray.slot];
     const float strength = stage_->lighting.ambient + stage_->lighting.fill.y;
-    if (ray.through) sum.background += ray.weight;
-    else sum.light += ray.weight * sky_radiance(ray.direction, ray.roughness) * strength;
+    if (ray.through)
+        sum.background += ray.weight;
+    else
+        sum.light += ray.weight * sky_radiance(ray.direction, ray.roughness) * strength;
 }
 
 void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, const Reach& reach, bool on_target) {
@@ -123,8 +127,10 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
         next.weight = weight * shaded.mirror;
         next.roughness = s.roughness;
         next.through = false;
-        if (largest(next.weight) < least_weight(next)) end_in_surroundings(next);
-        else push(next);
+        if (largest(next.weight) < least_weight(next))
+            end_in_surroundings(next);
+        else
+            push(next);
         next = ray;
         ++next.bounce;
     }
@@ -165,8 +171,10 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
         return;
     }
     const auto material = std::int32_t(s.material - scene.materials.data());
-    if (point.front) next.media.enter(material);
-    else next.media.leave(material);
+    if (point.front)
+        next.media.enter(material);
+    else
+        next.media.leave(material);
     const auto ior = [&](const Media& media) {
         const std::int32_t m = media.innermost();
         return m == kNone ? 1.0f : std::max(1.0f, scene.materials[std::size_t(m)].ior);
@@ -232,7 +240,8 @@ void Shader::trace_newest() {
             continue;
         }
         const std::int32_t medium = ray.media.innermost();
-        if (medium != kNone) ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);
+        if (medium != kNone)
+            ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);
         if (largest(ray.weight) < least_weight(ray)) continue;
         Hit& h = hit[std::size_t(i)];
         h = {from.part(i), from.triangle[i], from.u[i], from.v[i]};

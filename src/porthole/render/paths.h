@@ -40,13 +40,13 @@ struct Media {
 struct PathRay {
     Vec3f origin, direction;
     Vec3f weight{1, 1, 1};
-    std::uint32_t slot = 0;  ///< whose radiance it adds to
-    int bounce = 0;          ///< surfaces behind it
-    int pattern = 0;         ///< which part of the patterns it takes where it spreads, >= 0
-    float roughness = 0;     ///< of the mirror it comes from
+    std::uint32_t slot = 0; ///< whose radiance it adds to
+    int bounce = 0;         ///< surfaces behind it
+    int pattern = 0;        ///< which part of the patterns it takes where it spreads, >= 0
+    float roughness = 0;    ///< of the mirror it comes from
     bool in_hole = false;
-    bool spread = false;     ///< one of many that frosted glass made of a camera ray
-    bool through = true;     ///< it only ever passed through things: it sees the background, not the sky
+    bool spread = false; ///< one of many that frosted glass made of a camera ray
+    bool through = true; ///< it only ever passed through things: it sees the background, not the sky
     Media media;
 };
 

@@ -26,9 +26,9 @@ struct Picture {
     const RenderParams& params;
     const Camera& camera;
     GBuffer buffer;
-    Image<Vec4f> color;   ///< display-linear, premultiplied; the buffer's window
-    Mask edges;           ///< 1 where the first sample is not enough
-    Mask opened;          ///< with a cut: 1 where some sample is in the hole
+    Image<Vec4f> color; ///< display-linear, premultiplied; the buffer's window
+    Mask edges;         ///< 1 where the first sample is not enough
+    Mask opened;        ///< with a cut: 1 where some sample is in the hole
     RayTotals rays;
 
     Picture(const View& seen, const RenderParams& how, const Camera& by, Rect window)

@@ -75,8 +75,10 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
     if (targets_ && !targets_->empty()) {
         RayHit16 packet;
         for (int i = 0; i < kLanes; ++i) {
-            if (samples.active[i] && samples.may_open[i]) packet.set(i, seen.origin[i], seen.direction[i], 0, kInfinity);
-            else packet.clear(i);
+            if (samples.active[i] && samples.may_open[i])
+                packet.set(i, seen.origin[i], seen.direction[i], 0, kInfinity);
+            else
+                packet.clear(i);
         }
         intersect(*targets_, packet, Coherence::coherent);
         for (int i = 0; i < kLanes; ++i) {
@@ -105,8 +107,7 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         // Behind a target the cut set cannot be seen, in front of it nothing is left of it.
         if (!seen.on_target[i]) cut_set[i] = start(CutRole::cut_set);
         // What lies on the target counts as behind it.
-        if (seen.on_target[i])
-            seen.depth[i] = target_depth[i] - std::max(tolerance_, rounding(target_depth[i]));
+        if (seen.on_target[i]) seen.depth[i] = target_depth[i] - std::max(tolerance_, rounding(target_depth[i]));
     }
     // Where the underside of a cut wall lies on the floor it stood on, the floor is seen.
     if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, 0, seen, rays);
@@ -117,7 +118,8 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
     if (rim_px_ > 0) mark_rim(samples, depth_per_t, seen, rays);
 }
 
-void Camera::mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen, RayCounts& rays) const {
+void Camera::mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
+                      RayCounts& rays) const {
     RayHit16 packet;
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {

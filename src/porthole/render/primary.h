@@ -38,8 +38,8 @@ public:
 
 private:
     void trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const;
-    void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes], float tolerance,
-                    Seen16& seen, RayCounts& rays) const;
+    void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],
+                    float tolerance, Seen16& seen, RayCounts& rays) const;
 
     void mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen, RayCounts& rays) const;
 
@@ -48,7 +48,7 @@ private:
     const View* view_;
     const Cut* cut_;
     float rim_px_ = 0;
-    float tolerance_ = 0;      ///< metres in front of a target that count as behind it
+    float tolerance_ = 0; ///< metres in front of a target that count as behind it
     bool has_kept_ = false, has_cut_set_ = false, has_loose_ = false;
 };
 

@@ -75,7 +75,8 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
         // Each sample of a pixel looks at another part of the lamps.
         const int pattern = cell_rank(pixels[i].x, pixels[i].y) + s * 5;
         if (flat) {
-            shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], pattern), hit, p, {}, seen.on_target[i]);
+            shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], pattern), hit, p, {},
+                       seen.on_target[i]);
             continue;
         }
         askers[n] = {p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern};
@@ -89,8 +90,8 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
     for (std::size_t k = 0; k < n; ++k) {
         const std::size_t i = lane_of[k];
         const Reach reach = ambient[k] >= 0 ? Reach{lamps[k], ambient[k]} : stage.occlusion.reach(askers[k], rays);
-        shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], askers[k].pattern), seen.hit[i], surface[i], reach,
-                   seen.on_target[i]);
+        shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], askers[k].pattern),
+                   seen.hit[i], surface[i], reach, seen.on_target[i]);
     }
 }
 
@@ -126,7 +127,8 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
         for (int x = tile.x0; x < tile.x1; ++x) {
             const Pixel& pixel = buffer.pixels(x, y);
             if (!pixel.has(Pixel::traced)) continue;
-            const Vec4f c = display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
+            const Vec4f c =
+                display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
             picture.color(x, y) = pixel.has(Pixel::on_rim) ? rim_line(c) : c;
             picture.opened(x, y) = pixel.has(Pixel::in_hole) ? 1 : 0;
         }

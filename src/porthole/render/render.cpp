@@ -33,7 +33,8 @@ public:
         parallel_for_tiles(window_, FilteredTile::kSize, control_, [&](Rect tile) {
             body(tile);
             const std::int64_t n = ++done;
-            if (control_.progress) control_.progress("render", base_ + share * std::min(1.0, double(n) / double(tiles_)));
+            if (control_.progress)
+                control_.progress("render", base_ + share * std::min(1.0, double(n) / double(tiles_)));
         });
         base_ += share;
         if (control_.progress) control_.progress("render", std::min(1.0, base_));

@@ -18,16 +18,17 @@ enum class Emphasis : std::uint8_t { accent, saturate, none };
 enum class Shading : std::uint8_t { raytraced, flat };
 
 struct RenderParams {
-    int samples = 8;       ///< most samples per pixel, [1, 4096], spent where neighbours differ; 1: one at each centre
-    int ao_samples = 4;    ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
+    int samples = 8;    ///< most samples per pixel, [1, 4096], spent where neighbours differ; 1: one at each centre
+    int ao_samples = 4; ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
     bool shadows = true;
-    int max_bounces = 6;   ///< reflections, refractions and blended surfaces along one path, [0, 64]
+    int max_bounces = 6;                  ///< reflections, refractions and blended surfaces along one path, [0, 64]
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
-    float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, [0, 100]; without it, shells of one
-                         ///< colour swallow the hole. Never on a target; none with flat shading
+    float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, [0, 100]; without it, shells of
+                         ///< one colour swallow the hole. Never on a target; none with flat shading
     Vec3f background{1, 1, 1}; ///< linear; seen, tinted, through coloured glass
-    float target_radius = 0;   ///< of the targets' bounding sphere, metres: scales ambient occlusion inside the hole; 0: unknown
+    float target_radius =
+        0; ///< of the targets' bounding sphere, metres: scales ambient occlusion inside the hole; 0: unknown
 };
 
 struct RayCounts {
@@ -41,7 +42,7 @@ struct Frame {
     /// adds light. Alpha 0 where nothing is hit: the background is not in it, except for the
     /// tint that coloured glass gives it.
     Image<Vec4f> color;
-    IdBuffer ids;       ///< at pixel centres: nearest part that is not cut away, and its depth
+    IdBuffer ids; ///< at pixel centres: nearest part that is not cut away, and its depth
     RayCounts rays;
 };
 

@@ -30,8 +30,8 @@ bool same_color(Vec4f a, Vec4f b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 /// A floor, a wall, boxes and spheres of several materials, some of them glass.
 Scene still_life() {
     Scene s;
-    s.materials = {matte({0.8f, 0.8f, 0.8f}), matte({0.7f, 0.2f, 0.1f}), matte({0.9f, 0.9f, 0.9f}), matte({0.5f, 0.9f, 0.6f}),
-                   matte({0.2f, 0.3f, 0.8f})};
+    s.materials = {matte({0.8f, 0.8f, 0.8f}), matte({0.7f, 0.2f, 0.1f}), matte({0.9f, 0.9f, 0.9f}),
+                   matte({0.5f, 0.9f, 0.6f}), matte({0.2f, 0.3f, 0.8f})};
     s.materials[2].metallic = 1, s.materials[2].roughness = 0.05f;
     s.materials[3].transmission = 1, s.materials[3].thickness = 0.1f, s.materials[3].roughness = 0;
     s.materials[4].alpha_mode = AlphaMode::blend, s.materials[4].base_color.w = 0.4f;
@@ -47,7 +47,8 @@ struct Built {
     Scene scene;
     MeshBvhs meshes;
     Bvh bvh;
-    explicit Built(Scene s) : scene(std::move(s)), meshes(build_mesh_bvhs(scene)), bvh(build_bvh(meshes, all_parts(scene))) {}
+    explicit Built(Scene s)
+        : scene(std::move(s)), meshes(build_mesh_bvhs(scene)), bvh(build_bvh(meshes, all_parts(scene))) {}
     Built(const Built&) = delete;
     Built& operator=(const Built&) = delete;
     [[nodiscard]] Frame draw(const View& view, const RenderParams& params = {}, int threads = 2) const {
@@ -302,7 +303,8 @@ TEST(Render, StopsWhenAsked) {
         source.request_stop();
     };
     control.threads = 1;
-    EXPECT_THROW((void)render(b.bvh, nullptr, look_at({0, 1, 4}, {0, 0, 0}, 512, 512), {}, nullptr, nullptr, control), Cancelled);
+    EXPECT_THROW((void)render(b.bvh, nullptr, look_at({0, 1, 4}, {0, 0, 0}, 512, 512), {}, nullptr, nullptr, control),
+                 Cancelled);
     EXPECT_LT(last, 0.3);
 }
 

@@ -15,8 +15,8 @@ float ramp(float a, float b, float x) {
 
 } // namespace
 
-Shaded shade(const Lighting& lighting, const SurfacePoint& point, Vec3f normal, Vec3f to_eye,
-             const Substance& s, const Reach& reach, bool trace_mirrors) {
+Shaded shade(const Lighting& lighting, const SurfacePoint& point, Vec3f normal, Vec3f to_eye, const Substance& s,
+             const Reach& reach, bool trace_mirrors) {
     Shaded out{};
     if (s.material->unlit) {
         out.shown = s.color;
@@ -44,8 +44,8 @@ Shaded shade(const Lighting& lighting, const SurfacePoint& point, Vec3f normal, 
 
     const float closed_in = 1.0f - reach.ambient * s.occlusion;
     const float ambient = 1.0f - lighting.ambient_shadow * closed_in;
-    const float fill = (1.0f - lighting.fill_shadow * closed_in) *
-                       std::max(0.0f, dot(normal, lighting.to_fill(point.position)));
+    const float fill =
+        (1.0f - lighting.fill_shadow * closed_in) * std::max(0.0f, dot(normal, lighting.to_fill(point.position)));
     light += matte * (sky_irradiance(normal) * (lighting.ambient * ambient) + lighting.fill * fill);
 
     // Mirror image of the surroundings. The sky stands for the fill as well, or metals would
@@ -65,7 +65,8 @@ Shaded shade(const Lighting& lighting, const SurfacePoint& point, Vec3f normal, 
 }
 
 Vec3f shade_flat(const Substance& s, Vec3f normal, Vec3f to_eye) {
-    const Vec3f color{std::clamp(s.color.x, 0.0f, 1.0f), std::clamp(s.color.y, 0.0f, 1.0f), std::clamp(s.color.z, 0.0f, 1.0f)};
+    const Vec3f color{std::clamp(s.color.x, 0.0f, 1.0f), std::clamp(s.color.y, 0.0f, 1.0f),
+                      std::clamp(s.color.z, 0.0f, 1.0f)};
     return color * clamp01(dot(normal, to_eye));
 }
 

@@ -65,11 +65,13 @@ std::vector<Placement> make_placements(const Scene& scene) {
         // Cofactors keep normals perpendicular; a mirrored map turns them inside out.
         const Affine3d& a = part.world_from_mesh;
         const double sign = a.determinant() < 0 ? -1.0 : 1.0;
-        p.nx = Vec3f(cross(a.y, a.z) * sign), p.ny = Vec3f(cross(a.z, a.x) * sign), p.nz = Vec3f(cross(a.x, a.y) * sign);
+        p.nx = Vec3f(cross(a.y, a.z) * sign), p.ny = Vec3f(cross(a.z, a.x) * sign),
+        p.nz = Vec3f(cross(a.x, a.y) * sign);
         // Rays lose precision with the size of coordinates, in the world and in the mesh.
         const Affine3f& m = p.world_from_mesh;
         const float stretch = std::max({length(m.x), length(m.y), length(m.z)});
-        const float mesh_size = mesh.bounds.empty() ? 0 : std::max(largest(mesh.bounds.lower), largest(mesh.bounds.upper));
+        const float mesh_size =
+            mesh.bounds.empty() ? 0 : std::max(largest(mesh.bounds.lower), largest(mesh.bounds.upper));
         p.offset = 4e-6f * (largest(m.p) + stretch * mesh_size);
 
         bool transmits = false;
@@ -110,7 +112,8 @@ SurfacePoint surface_point(const Placement& placement, const Hit& hit, Vec3f dir
         const float limit = 0.5f * length(face);
         const float a = dot(normal[0], face), b = dot(normal[1], face), c = dot(normal[2], face);
         const bool out = a > limit && b > limit && c > limit, in = a < -limit && b < -limit && c < -limit;
-        if (out || in) lift = placement.world_from_mesh.vector(bulge(corner, normal, weight, p, out == s.front ? 1.0f : -1.0f));
+        if (out || in)
+            lift = placement.world_from_mesh.vector(bulge(corner, normal, weight, p, out == s.front ? 1.0f : -1.0f));
     }
     const float offset = placement.offset;
     s.start = s.position + lift + flat * offset;
@@ -195,7 +198,8 @@ Vec3f mapped_normal(const Scene& scene, const Placement& placement, const Hit& h
     } else {
         // From how the texture lies on the triangle.
         const auto& uv = mesh.uv[ref.uv_set];
-        const Vec2f a = transform_uv(ref, uv[tri.x]), b = transform_uv(ref, uv[tri.y]) - a, c = transform_uv(ref, uv[tri.z]) - a;
+        const Vec2f a = transform_uv(ref, uv[tri.x]), b = transform_uv(ref, uv[tri.y]) - a,
+                    c = transform_uv(ref, uv[tri.z]) - a;
         const Vec3f e1 = m.vector(mesh.positions[tri.y] - mesh.positions[tri.x]);
         const Vec3f e2 = m.vector(mesh.positions[tri.z] - mesh.positions[tri.x]);
         const float det = b.x * c.y - c.x * b.y;

@@ -20,10 +20,10 @@ struct Hit {
 /// A part's placement in float, ready for shading.
 struct Placement {
     Affine3f world_from_mesh;
-    Vec3f nx, ny, nz;         ///< columns that turn an outward mesh normal into an outward world normal
+    Vec3f nx, ny, nz; ///< columns that turn an outward mesh normal into an outward world normal
     const Mesh* mesh = nullptr;
-    float offset = 0;         ///< how far secondary rays start off the surface, metres
-    bool closed = false;      ///< a transmissive part whose surface is closed: light bends in it
+    float offset = 0;    ///< how far secondary rays start off the surface, metres
+    bool closed = false; ///< a transmissive part whose surface is closed: light bends in it
 };
 
 /// Placements of all parts of a scene; keeps pointers into it.
@@ -32,13 +32,13 @@ struct Placement {
 
 /// Geometry of a hit, seen along a ray.
 struct SurfacePoint {
-    Vec3f position;      ///< on the triangle
-    Vec3f start;         ///< where secondary rays start on the viewer's side: off the triangle, on the curved
-                         ///< surface that the vertex normals describe, so that facets cast no shadow on it
-    Vec3f beyond;        ///< where rays start that go through the surface
-    Vec3f flat_normal;   ///< unit, of the triangle, on the viewer's side
-    Vec3f normal;        ///< unit, smooth, on the viewer's side of surface and triangle
-    bool front = true;   ///< seen from outside, as the winding says
+    Vec3f position;    ///< on the triangle
+    Vec3f start;       ///< where secondary rays start on the viewer's side: off the triangle, on the curved
+                       ///< surface that the vertex normals describe, so that facets cast no shadow on it
+    Vec3f beyond;      ///< where rays start that go through the surface
+    Vec3f flat_normal; ///< unit, of the triangle, on the viewer's side
+    Vec3f normal;      ///< unit, smooth, on the viewer's side of surface and triangle
+    bool front = true; ///< seen from outside, as the winding says
 };
 /// @param direction  unit, of the ray that hit.
 [[nodiscard]] SurfacePoint surface_point(const Placement& placement, const Hit& hit, Vec3f direction);
@@ -46,13 +46,13 @@ struct SurfacePoint {
 /// What the surface is made of at a hit, textures and vertex colours looked up.
 struct Substance {
     const Material* material = nullptr;
-    Vec3f color;          ///< base colour, linear, as in the file
-    Vec3f diffuse;        ///< albedo of the matte part
-    Vec3f f0;             ///< reflectance at normal incidence
-    float roughness = 1;  ///< [0.03, 1]
-    float coverage = 1;   ///< alpha of blended materials
+    Vec3f color;         ///< base colour, linear, as in the file
+    Vec3f diffuse;       ///< albedo of the matte part
+    Vec3f f0;            ///< reflectance at normal incidence
+    float roughness = 1; ///< [0.03, 1]
+    float coverage = 1;  ///< alpha of blended materials
     float transmission = 0;
-    float occlusion = 1;  ///< from the occlusion texture
+    float occlusion = 1; ///< from the occlusion texture
     Vec3f emission;
 };
 

@@ -96,8 +96,10 @@ MeshRepair finish_mesh(Mesh& mesh) {
     for (const Vec3u& t : mesh.triangles) used[t.x] = used[t.y] = used[t.z] = 1;
     mesh.bounds = {};
     for (std::size_t i = 0; i < vertices; ++i)
-        if (used[i]) mesh.bounds.extend(mesh.positions[i]);
-        else mesh.positions[i] = mesh.triangles.empty() ? Vec3f{} : mesh.positions[mesh.triangles[0].x];
+        if (used[i])
+            mesh.bounds.extend(mesh.positions[i]);
+        else
+            mesh.positions[i] = mesh.triangles.empty() ? Vec3f{} : mesh.positions[mesh.triangles[0].x];
     mesh.positions.reserve(vertices + 1);
     return repair;
 }

@@ -41,8 +41,8 @@ struct Material {
     Vec4f base_color{1, 1, 1, 1}; ///< diffuse colour when specular_workflow
     float metallic = 1, roughness = 1;
     bool specular_workflow = false;
-    Vec3f specular_color{1, 1, 1}; ///< reflectance at normal incidence; specular_workflow only
-    Vec3f emissive{0, 0, 0};       ///< includes KHR_materials_emissive_strength
+    Vec3f specular_color{1, 1, 1};         ///< reflectance at normal incidence; specular_workflow only
+    Vec3f emissive{0, 0, 0};               ///< includes KHR_materials_emissive_strength
     TextureRef base_color_texture;         ///< sRGB, alpha linear
     TextureRef metallic_roughness_texture; ///< G roughness, B metallic; or RGB specular (sRGB) + A glossiness
     TextureRef normal_texture, emissive_texture, occlusion_texture;
@@ -51,7 +51,7 @@ struct Material {
     float alpha_cutoff = 0.5f;
     bool double_sided = false;
     bool unlit = false;
-    float transmission = 0; ///< share of light that passes, KHR_materials_transmission
+    float transmission = 0;          ///< share of light that passes, KHR_materials_transmission
     TextureRef transmission_texture; ///< R
     float ior = 1.5f;
     float thickness = 0; ///< metres; 0: a thin sheet that does not bend light
@@ -74,7 +74,7 @@ struct Mesh {
     std::vector<Vec3f> normals;   ///< unit length; empty: shaded flat
     std::vector<Vec4f> tangents;  ///< xyz unit length, w = handedness
     std::array<std::vector<Vec2f>, 2> uv;
-    std::vector<Vec4f> colors; ///< linear, multiplies base_color
+    std::vector<Vec4f> colors;      ///< linear, multiplies base_color
     std::vector<Submesh> submeshes; ///< in order, covering every triangle once
     Bounds3f bounds;
 
@@ -82,9 +82,9 @@ struct Mesh {
 };
 
 struct Part {
-    std::string name; ///< as in the file, raw bytes made valid UTF-8; may be empty or repeat
-    std::string path; ///< unique: names from the root joined by '/', "[n]" where unnamed or repeated
-    std::uint32_t mesh = 0; ///< index into Scene::meshes
+    std::string name;         ///< as in the file, raw bytes made valid UTF-8; may be empty or repeat
+    std::string path;         ///< unique: names from the root joined by '/', "[n]" where unnamed or repeated
+    std::uint32_t mesh = 0;   ///< index into Scene::meshes
     Affine3d world_from_mesh; ///< relative to Scene::origin; invertible
 };
 
@@ -92,10 +92,10 @@ struct Light {
     enum class Kind : std::uint8_t { directional, point, spot } kind = Kind::directional;
     std::string name;
     Vec3f color{1, 1, 1};
-    float intensity = 1; ///< lux (directional) or candela
-    Vec3f position;      ///< world
-    Vec3f direction{0, 0, -1}; ///< world, unit; the way the light travels
-    float range = kInfinity;   ///< metres
+    float intensity = 1;                        ///< lux (directional) or candela
+    Vec3f position;                             ///< world
+    Vec3f direction{0, 0, -1};                  ///< world, unit; the way the light travels
+    float range = kInfinity;                    ///< metres
     float inner_cone = 0, outer_cone = kPi / 4; ///< radians from the axis
 };
 
@@ -104,13 +104,13 @@ struct FileCamera {
     std::string name;
     Affine3d world_from_camera; ///< orthonormal, relative to Scene::origin
     bool orthographic = false;
-    float fov_y = 0.8f;      ///< radians
+    float fov_y = 0.8f;    ///< radians
     float half_height = 1; ///< metres, orthographic
 };
 
 struct Scene {
     std::vector<Mesh> meshes;
-    std::vector<Part> parts; ///< PartId i is parts[i], in the order of the file's tree
+    std::vector<Part> parts;         ///< PartId i is parts[i], in the order of the file's tree
     std::vector<Material> materials; ///< at least one when there is a mesh
     std::vector<Texture> textures;
     std::vector<Image<Rgba8>> images; ///< an empty image: could not be read (a warning says so)

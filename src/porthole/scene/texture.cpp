@@ -96,10 +96,10 @@ Vec4f sample_texture(const Scene& scene, const TextureRef& ref, Vec2f uv, Encodi
     const Tap a = make_tap(p.x, image.width(), texture.wrap_u, texture.nearest);
     const Tap b = make_tap(p.y, image.height(), texture.wrap_v, texture.nearest);
     if (texture.nearest) return texel(image, x0 + a.i0, y0 + b.i0, encoding);
-    const Vec4f top = texel(image, x0 + a.i0, y0 + b.i0, encoding) * (1 - a.f) +
-                      texel(image, x0 + a.i1, y0 + b.i0, encoding) * a.f;
-    const Vec4f bottom = texel(image, x0 + a.i0, y0 + b.i1, encoding) * (1 - a.f) +
-                         texel(image, x0 + a.i1, y0 + b.i1, encoding) * a.f;
+    const Vec4f top =
+        texel(image, x0 + a.i0, y0 + b.i0, encoding) * (1 - a.f) + texel(image, x0 + a.i1, y0 + b.i0, encoding) * a.f;
+    const Vec4f bottom =
+        texel(image, x0 + a.i0, y0 + b.i1, encoding) * (1 - a.f) + texel(image, x0 + a.i1, y0 + b.i1, encoding) * a.f;
     return top * (1 - b.f) + bottom * b.f;
 }
 
@@ -140,15 +140,17 @@ Vec3f transmission_tint(const Scene& scene, const Mesh& mesh, std::uint32_t tria
 
     Vec3f through{0, 0, 0}; // what the covered share of the surface lets pass
     if (material.transmission > 0) {
-        const float share = clamp01(material.transmission) *
-                            sample_texture(scene, material.transmission_texture, mesh, triangle, u, v, Encoding::linear).x;
+        const float share =
+            clamp01(material.transmission) *
+            sample_texture(scene, material.transmission_texture, mesh, triangle, u, v, Encoding::linear).x;
         if (material.thickness > 0) {
             const float crossings = 0.5f * material.thickness / material.attenuation_distance;
             const auto half = [&](float c, float attenuation) {
                 return std::sqrt(c) * (crossings > 0 ? std::pow(clamp01(attenuation), crossings) : 1.0f);
             };
             through = Vec3f{half(color.x, material.attenuation_color.x), half(color.y, material.attenuation_color.y),
-                            half(color.z, material.attenuation_color.z)} * share;
+                            half(color.z, material.attenuation_color.z)} *
+                      share;
         } else {
             through = color * share;
         }

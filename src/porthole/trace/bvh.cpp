@@ -30,8 +30,10 @@ SurfaceKind surface_kind(const Scene& scene, const Mesh& mesh) {
     SurfaceKind kind = SurfaceKind::opaque;
     for (const Submesh& s : mesh.submeshes) {
         const Material& m = scene.materials[s.material];
-        if (m.alpha_mode == AlphaMode::blend || m.transmission > 0) kind = SurfaceKind::tinted;
-        else if (m.alpha_mode == AlphaMode::mask && kind == SurfaceKind::opaque) kind = SurfaceKind::holed;
+        if (m.alpha_mode == AlphaMode::blend || m.transmission > 0)
+            kind = SurfaceKind::tinted;
+        else if (m.alpha_mode == AlphaMode::mask && kind == SurfaceKind::opaque)
+            kind = SurfaceKind::holed;
     }
     return kind;
 }
@@ -191,7 +193,8 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
             const Mesh& mesh = scene.mesh_of(c.part);
             const Material& material = scene.materials[mesh.material_of(c.triangle)];
             if (material.alpha_mode != AlphaMode::blend && !(material.transmission > 0)) continue;
-            if (query.transmittance) query.transmittance[c.lane] *= transmission_tint(scene, mesh, c.triangle, c.u, c.v);
+            if (query.transmittance)
+                query.transmittance[c.lane] *= transmission_tint(scene, mesh, c.triangle, c.u, c.v);
             args->valid[i] = 0;
         }
     }
@@ -200,8 +203,8 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
 QueryContext make_context(const Bvh& bvh, Coherence coherence) {
     QueryContext query;
     rtcInitIntersectContext(&query.rtc);
-    query.rtc.flags = coherence == Coherence::coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                                       : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    query.rtc.flags =
+        coherence == Coherence::coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     query.bvh = &bvh.state();
     return query;
 }
@@ -269,8 +272,10 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
     std::vector<std::size_t> small;
     for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
         if (control.stop.stop_requested()) throw Cancelled{};
-        if (scene.meshes[i].triangles.size() >= kLarge) build(i);
-        else small.push_back(i);
+        if (scene.meshes[i].triangles.size() >= kLarge)
+            build(i);
+        else
+            small.push_back(i);
     }
     parallel_for(small.size(), control, [&](std::size_t k) { build(small[k]); });
     return MeshBvhs(std::move(state));
@@ -297,7 +302,8 @@ Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<c
     const auto shape_key = [&](PartId id) {
         const Part& part = scene.parts[index(id)];
         const Affine3d& a = part.world_from_mesh;
-        return std::array<double, 12>{a.x.x, a.x.y, a.x.z, a.y.x, a.y.y, a.y.z, a.z.x, a.z.y, a.z.z, a.p.x, a.p.y, a.p.z};
+        return std::array<double, 12>{a.x.x, a.x.y, a.x.z, a.y.x, a.y.y, a.y.z,
+                                      a.z.x, a.z.y, a.z.z, a.p.x, a.p.y, a.p.z};
     };
     const auto hash = [&](PartId id) { return base.hashes[scene.parts[index(id)].mesh]; };
 
@@ -388,8 +394,8 @@ void intersect_cut(const Bvh& bvh, RayHit16& rays, int lane, const Cut* cut) {
     RTCRayHit one;
     float tnear = rays.tnear[lane];
     for (;;) {
-        one.ray = {rays.org_x[lane], rays.org_y[lane], rays.org_z[lane], tnear,
-                   rays.dir_x[lane], rays.dir_y[lane], rays.dir_z[lane], 0,
+        one.ray = {rays.org_x[lane], rays.org_y[lane], rays.org_z[lane],    tnear,
+                   rays.dir_x[lane], rays.dir_y[lane], rays.dir_z[lane],    0,
                    rays.tfar[lane],  rays.mask[lane],  std::uint32_t(lane), 0};
         one.hit.geomID = one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
         QueryContext query = make_context(bvh, Coherence::incoherent);

@@ -82,7 +82,7 @@ public:
     ~Bvh();
     [[nodiscard]] const State& state() const { return *state_; }
     [[nodiscard]] const Scene& scene() const;
-    [[nodiscard]] bool empty() const; ///< no parts
+    [[nodiscard]] bool empty() const;            ///< no parts
     [[nodiscard]] bool holds(PartId part) const; ///< among the parts it was built from
 
 private:

@@ -43,9 +43,8 @@ SolidTest test_mesh(const Bvh& bvh, const Bounds3f& box, const Affine3d& world_f
             rays.set(i, world_a - direction * (2 * size), direction, 0, kInfinity);
             if (first + i >= kRays) rays.clear(i);
         }
-        for_each_crossing(bvh, rays, [&](const Crossing& c) {
-            crossings[std::size_t(c.lane)].emplace_back(c.t, c.entering);
-        });
+        for_each_crossing(bvh, rays,
+                          [&](const Crossing& c) { crossings[std::size_t(c.lane)].emplace_back(c.t, c.entering); });
         for (auto& list : crossings) {
             if (list.empty()) continue;
             // At one t leaving sorts before entering: faces that touch count as two solids.
@@ -74,8 +73,9 @@ std::vector<SolidTest> test_solids(const MeshBvhs& meshes, const std::vector<std
     parallel_for(scene.meshes.size(), control, [&](std::size_t i) {
         if (shown[i] == kNoPart || scene.meshes[i].triangles.empty()) return;
         const std::array<PartId, 1> one{shown[i]};
-        results[i] = test_mesh(build_bvh(meshes, one), scene.meshes[i].bounds,
-                               scene.parts[index(shown[i])].world_from_mesh, std::uint32_t(scene.meshes[i].triangles.size()));
+        results[i] =
+            test_mesh(build_bvh(meshes, one), scene.meshes[i].bounds, scene.parts[index(shown[i])].world_from_mesh,
+                      std::uint32_t(scene.meshes[i].triangles.size()));
     });
     return results;
 }

@@ -10,8 +10,8 @@ namespace porthole {
 
 /// What some hundred random rays through a mesh say.
 struct SolidTest {
-    int rays = 0;     ///< rays that met it at all
-    int balanced = 0; ///< of those, entered and left equally often, never left before entering
+    int rays = 0;          ///< rays that met it at all
+    int balanced = 0;      ///< of those, entered and left equally often, never left before entering
     bool inverted = false; ///< `balanced` counts with every face turned around, which fits better
 
     /// Balanced on nearly all (94 %) of at least eight rays.

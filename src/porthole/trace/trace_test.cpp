@@ -54,8 +54,8 @@ TEST(Trace, BlocksEqualTheFullBufferFromManyDirections) {
     for (int k = 0; k < 32; ++k) {
         // Some eyes are among the targets, so that boxes reach behind the camera.
         const float distance = k % 4 == 0 ? 0.5f : 6.0f;
-        const View view = view_from(
-            normalize(Vec3f{normal(random), normal(random), normal(random)}) * distance, 101, 67);
+        const View view =
+            view_from(normalize(Vec3f{normal(random), normal(random), normal(random)}) * distance, 101, 67);
         const Rect window = view.window().grown(13);
         const BlockMask blocks = mark_blocks(scene, targets, boxes, view, window);
         EXPECT_EQ(trace_ids(bvh, view, window), trace_ids_in_blocks(bvh, view, window, blocks)) << "direction " << k;

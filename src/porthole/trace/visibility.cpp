@@ -250,7 +250,8 @@ Spans trace_spans(const Bvh& bvh, std::uint32_t mask, const View& view, const Id
                 const std::uint32_t gap = std::bit_cast<std::uint32_t>(std::max(0.0f, depth[lane] - d));
                 std::atomic<std::uint32_t>& greatest = gaps[index(c.part)];
                 std::uint32_t seen = greatest.load(std::memory_order_relaxed);
-                while (seen < gap && !greatest.compare_exchange_weak(seen, gap, std::memory_order_relaxed)) {}
+                while (seen < gap && !greatest.compare_exchange_weak(seen, gap, std::memory_order_relaxed)) {
+                }
                 met.emplace_back(c.part, lane);
             });
             std::sort(met.begin(), met.end());
@@ -320,8 +321,8 @@ Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask, 
     return farthest;
 }
 
-Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from,
-                  const Control& control, std::int64_t* rays) {
+Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& from, const Control& control,
+                  std::int64_t* rays) {
     Mask beyond(mask.window(), 0);
     std::atomic<std::int64_t> traced{0};
     parallel_for_tiles(mask.window(), kTile, control, [&](Rect tile) {
@@ -342,7 +343,8 @@ Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Imag
             }
             occluded_by_any(bvh, packet);
             for (int i = 0; i < kLanes; ++i)
-                if (packet.tfar[i] == -kInfinity && packet.tnear[i] < kInfinity) beyond(x0 + (i & 3), y0 + (i >> 2)) = 1;
+                if (packet.tfar[i] == -kInfinity && packet.tnear[i] < kInfinity)
+                    beyond(x0 + (i & 3), y0 + (i >> 2)) = 1;
         });
         traced += n;
     });
@@ -361,8 +363,10 @@ Mask trace_back_faces(const Bvh& bvh, const View& view, const Mask& mask, const 
             for (int i = 0; i < kLanes; ++i) {
                 if (!packet.active(i)) continue;
                 const int x = x0 + (i & 3), y = y0 + (i >> 2);
-                if (mask(x, y) && from(x, y) < kInfinity) packet.tnear[i] = std::max(0.0f, from(x, y) / depth_per_t[i]);
-                else packet.clear(i);
+                if (mask(x, y) && from(x, y) < kInfinity)
+                    packet.tnear[i] = std::max(0.0f, from(x, y) / depth_per_t[i]);
+                else
+                    packet.clear(i);
             }
             intersect(bvh, packet, Coherence::coherent);
             for (int i = 0; i < kLanes; ++i) {

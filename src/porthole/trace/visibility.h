@@ -31,8 +31,8 @@ struct ClusterBoxes {
 /// projected boxes of `parts` touch: near-clipped, rounded outward, one pixel more. A block
 /// that is not marked cannot hold a pixel whose ray hits one of the parts.
 struct BlockMask {
-    Rect blocks;  ///< in block coordinates (pixel / 4, rounded down)
-    Mask marked;  ///< window = blocks
+    Rect blocks; ///< in block coordinates (pixel / 4, rounded down)
+    Mask marked; ///< window = blocks
     [[nodiscard]] std::int64_t count() const;
 };
 [[nodiscard]] BlockMask mark_blocks(const Scene& scene, std::span<const PartId> parts, const ClusterBoxes& boxes,
@@ -71,9 +71,8 @@ struct Spans {
 
 /// At the pixels of `mask` the depth of the farthest surface of `bvh` nearer than `limit`
 /// there; -infinity where there is none and outside the mask.
-[[nodiscard]] Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask,
-                                          const Image<float>& limit, const Control& control = {},
-                                          std::int64_t* rays = nullptr);
+[[nodiscard]] Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask, const Image<float>& limit,
+                                          const Control& control = {}, std::int64_t* rays = nullptr);
 
 /// At the pixels of `mask` whether a ray meets any surface of `bvh` at depth `from` there or
 /// beyond; 0 outside the mask.
@@ -88,9 +87,9 @@ struct Spans {
 /// Hits of a target in the 16 sub-pixel positions (4x4 grid) of each pixel of `window`, for
 /// targets too small for pixel centres.
 struct FineCoverage {
-    Image<std::uint16_t> hits;  ///< bit 4 * row + column
-    Image<float> depth;         ///< nearest of the hits; +infinity if none
-    std::int64_t samples = 0;   ///< bits set
+    Image<std::uint16_t> hits; ///< bit 4 * row + column
+    Image<float> depth;        ///< nearest of the hits; +infinity if none
+    std::int64_t samples = 0;  ///< bits set
 };
 [[nodiscard]] FineCoverage trace_fine(const Bvh& bvh, const View& view, Rect window, const Control& control = {},
                                       std::int64_t* rays = nullptr);
