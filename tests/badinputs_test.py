@@ -37,6 +37,12 @@ PEAK_BYTES = 1 << 30
 ADDRESS_BYTES = 4 << 30
 OUTCOMES = ['ok', 'crashed', 'hung', 'silent', 'refused-legal', 'over-memory', 'untidy']
 
+# Rows whose verdict is wrong, with the reason; drawing them is right, and they are counted apart.
+DISPUTED = {
+    'gltf/misc/tinygltf_zero-sized-bin-chunk-issue-440.glb':
+        'a legal file: its BIN chunk is not empty but has the 44 bytes that its buffer asks for',
+}
+
 # What the program did with one file.
 Run = collections.namedtuple('Run', 'code seconds peak_bytes stderr picture', defaults=(0.1, 1 << 20, b'', None))
 
@@ -196,12 +202,15 @@ def main():
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         runs = pool.map(lambda row: run_row(options.program, corpus, row), rows)
         for row, run in zip(rows, runs):
-            outcome, why = judge(row['verdict'], run, not options.sanitized)
+            verdict = 'OK' if row['path'] in DISPUTED else row['verdict']
+            outcome, why = judge(verdict, run, not options.sanitized)
             tally[outcome] += 1
             if outcome != 'ok' or options.verbose:
                 last = run.stderr.decode('utf-8', 'replace').strip().splitlines()[-1:] or ['']
                 print(f'{outcome}: {row["path"]} ({row["verdict"]}): {why}: {last[0][:200]!r}')
-    print(f'badinputs: {len(rows)} files: ' + ', '.join(f'{tally[o]} {o}' for o in OUTCOMES))
+    disputed = sum(row['path'] in DISPUTED for row in rows)
+    print(f'badinputs: {len(rows)} files: ' + ', '.join(f'{tally[o]} {o}' for o in OUTCOMES) +
+          f' ({disputed} with a verdict held wrong)')
     sys.exit(0 if tally['ok'] == len(rows) else 1)
 
 

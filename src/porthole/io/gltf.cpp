@@ -46,6 +46,18 @@ std::vector<std::uint32_t> visible_nodes(std::span<const Node> nodes, std::span<
     return order;
 }
 
+// A file without any node says what there is, but not where: each mesh stands where it was made.
+std::vector<Node> nodes_of_meshes(Document& doc) {
+    std::vector<Node> nodes;
+    for (const Json& mesh : doc.list_of_objects(doc.root(), "meshes")) {
+        Node& node = nodes.emplace_back();
+        node.json = &mesh;
+        node.mesh = static_cast<std::int32_t>(nodes.size() - 1);
+    }
+    if (!nodes.empty()) doc.warn("W0305", doc.root(), {}, "there are no nodes; the meshes are drawn as they are");
+    return nodes;
+}
+
 std::size_t depth_of(std::span<const Node> nodes) {
     std::vector<std::size_t> level(nodes.size(), 1);
     std::vector<std::uint32_t> top;
@@ -88,6 +100,7 @@ Scene read(const FileBytes& file, const std::filesystem::path& path, const LoadP
     const std::vector<Accessor> accessors = read_accessors(doc, views, file_bytes);
 
     std::vector<Node> nodes = read_nodes(doc);
+    if (nodes.empty()) nodes = nodes_of_meshes(doc);
     if (params.time >= 0) animate(doc, accessors, params.time, file_bytes, nodes);
     const std::vector<Affine3d> world = world_transforms(nodes);
     const std::vector<std::uint32_t> drawn = visible_nodes(nodes, scene_roots(doc, nodes));

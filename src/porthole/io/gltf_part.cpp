@@ -198,7 +198,7 @@ void add_parts(Document& doc, std::span<const Node> nodes, const PlacedMeshes& p
                Scene& scene) {
     std::vector<std::int32_t> mesh_of(meshes.size(), kNone);
     for (std::size_t r = 0; r < meshes.size(); ++r) {
-        if (meshes[r].triangles.empty()) continue;
+        if (meshes[r].positions.empty()) continue; // points and lines only; they have warned
         mesh_of[r] = static_cast<std::int32_t>(scene.meshes.size());
         scene.meshes.push_back(std::move(meshes[r]));
     }
@@ -209,7 +209,8 @@ void add_parts(Document& doc, std::span<const Node> nodes, const PlacedMeshes& p
         const Node& node = nodes[p.node];
         const std::int32_t mesh = mesh_of[p.request];
         if (mesh == kNone) continue; // its primitives have warned
-        if (!is_usable(p.world_from_mesh, scene.meshes[std::size_t(mesh)].bounds)) {
+        const Bounds3f& bounds = scene.meshes[std::size_t(mesh)].bounds;
+        if (!is_usable(p.world_from_mesh, bounds.empty() ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : bounds)) {
             doc.warn("W0305", *node.json, {},
                      "the part is flat, or beyond 1.8e18, after its transforms; it is left out");
             continue;
