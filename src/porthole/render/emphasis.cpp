@@ -6,6 +6,7 @@ namespace {
 
 constexpr float kDistinct = 0.13f; ///< color_distance() at which two colours are told apart at a glance
 constexpr float kFew = 0.3f;       ///< share of pixels that may have a target's colour
+constexpr float kThin = 0.3f;      ///< share of inner pixels below which a target is thin
 constexpr float kBetter = 1.3f;    ///< how much more another accent must stand out to be taken
 constexpr Vec3f kAccents[] = {{0.95f, 0.36f, 0.06f}, {0.02f, 0.42f, 0.95f}};
 
@@ -49,18 +50,21 @@ struct Surroundings {
     }
 };
 
-struct Mean {
+/// What is seen of one target.
+struct Seen {
     Vec3d sum;
-    double count = 0;
-    void add(Vec3f c) {
-        sum += Vec3d(c);
-        count += 1;
-    }
-    [[nodiscard]] Vec3f value() const { return Vec3f(sum / count); }
+    double count = 0, inner = 0; ///< inner: all four neighbours see it too
+    [[nodiscard]] Vec3f mean() const { return Vec3f(sum / count); }
+    [[nodiscard]] bool thin() const { return inner < double(kThin) * count; }
 };
 
+bool shows_target(const GBuffer& buffer, int x, int y, PartId part) {
+    return buffer.pixels.contains(x, y) && buffer.ids.id(x, y) == part && buffer.pixels(x, y).has(Pixel::on_target);
+}
+
 Vec3f as_drawn(Vec3f c) {
-    return {std::clamp(c.x, kDarkest, kLightest), std::clamp(c.y, kDarkest, kLightest), std::clamp(c.z, kDarkest, kLightest)};
+    return {std::clamp(c.x, kDarkest, kLightest), std::clamp(c.y, kDarkest, kLightest),
+            std::clamp(c.z, kDarkest, kLightest)};
 }
 
 } // namespace
@@ -73,7 +77,7 @@ std::vector<Tint> target_tints(const Scene& scene, const std::vector<Placement>&
     if (emphasis == Emphasis::saturate) return std::vector<Tint>(scene.parts.size(), Tint{Tint::Kind::saturate, {}});
 
     Surroundings around;
-    std::vector<Mean> targets(scene.parts.size());
+    std::vector<Seen> targets(scene.parts.size());
     const Rect w = buffer.window();
     for (int y = w.y0 & ~1; y < w.y1; y += 2)
         for (int x = w.x0 & ~1; x < w.x1; x += 2) {
@@ -81,17 +85,24 @@ std::vector<Tint> target_tints(const Scene& scene, const std::vector<Placement>&
             const Hit hit = buffer.hit(x, y);
             if (!hit.any()) continue;
             const Vec3f c = substance(scene, placements[index(hit.part)], hit).color;
-            if (buffer.pixels(x, y).has(Pixel::on_target)) targets[index(hit.part)].add(c);
-            else around.add(as_drawn(c));
+            if (!shows_target(buffer, x, y, hit.part)) {
+                around.add(as_drawn(c));
+                continue;
+            }
+            Seen& seen = targets[index(hit.part)];
+            seen.sum += Vec3d(c);
+            seen.count += 1;
+            seen.inner += shows_target(buffer, x - 1, y, hit.part) && shows_target(buffer, x + 1, y, hit.part) &&
+                          shows_target(buffer, x, y - 1, hit.part) && shows_target(buffer, x, y + 1, hit.part);
         }
     Tint accent{Tint::Kind::accent, kAccents[0]};
     if (around.contrast(kAccents[1]) > kBetter * around.contrast(kAccents[0])) accent.accent = kAccents[1];
-    // What is too small to be met here needs the accent most.
+    // What is thin, or too small to be met here, needs the accent most.
     std::vector<Tint> tints(scene.parts.size(), accent);
     for (std::size_t i = 0; i < tints.size(); ++i) {
-        if (targets[i].count == 0) continue;
+        if (targets[i].count == 0 || targets[i].thin()) continue;
         const Tint own{Tint::Kind::saturate, {}};
-        if (around.sets_off(as_drawn(tinted(targets[i].value(), own)))) tints[i] = own;
+        if (around.sets_off(as_drawn(tinted(targets[i].mean(), own)))) tints[i] = own;
     }
     return tints;
 }

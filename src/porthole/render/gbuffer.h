@@ -55,22 +55,38 @@ struct Pixel {
     [[nodiscard]] bool has(Flag f) const { return (flags & f) != 0; }
 };
 
+/// Light that reaches a pixel's first sample, after the filter. 65535 is all of it.
+struct PixelLight {
+    std::uint16_t lamps[3] = {65535, 65535, 65535};
+    std::uint16_t ambient = 65535;
+
+    PixelLight() = default;
+    explicit PixelLight(const Reach& reach) {
+        const auto packed = [](float v) { return static_cast<std::uint16_t>(std::lround(clamp01(v) * 65535.0f)); };
+        for (int c = 0; c < 3; ++c) lamps[c] = packed(reach.lamps[c]);
+        ambient = packed(reach.ambient);
+    }
+    [[nodiscard]] Reach reach() const {
+        constexpr float k = 1.0f / 65535.0f;
+        return {{float(lamps[0]) * k, float(lamps[1]) * k, float(lamps[2]) * k}, float(ambient) * k};
+    }
+};
+
 struct GBuffer {
     Image<Pixel> pixels;
     IdBuffer ids;
-    Image<std::uint16_t> ambient; ///< after the filter, 65535 = open
+    Image<PixelLight> light;
 
-    explicit GBuffer(Rect window) : pixels(window), ids(window), ambient(window, 65535) {}
+    explicit GBuffer(Rect window) : pixels(window), ids(window), light(window) {}
     [[nodiscard]] Rect window() const { return pixels.window(); }
     [[nodiscard]] Hit hit(int x, int y) const {
         const Pixel& p = pixels(x, y);
         return {ids.id(x, y), p.triangle, p.u, p.v};
     }
     /// Pixels with the same key may share light: same part, same side of the rim.
-    [[nodiscard]] std::uint32_t key(int x, int y) const {
-        const PartId part = ids.id(x, y);
-        if (part == kNoPart) return kNoKey;
-        return index(part) * 2 + (pixels(x, y).has(Pixel::in_hole) ? 1u : 0u);
+    [[nodiscard]] std::uint32_t key(int x, int y) const { return key(ids.id(x, y), pixels(x, y).has(Pixel::in_hole)); }
+    [[nodiscard]] static std::uint32_t key(PartId part, bool in_hole) {
+        return part == kNoPart ? kNoKey : index(part) * 2 + (in_hole ? 1u : 0u);
     }
     static constexpr std::uint32_t kNoKey = 0xFFFFFFFFu;
 };

@@ -9,6 +9,14 @@ constexpr float kKeySize = 0.1f; // tangent of the key's angular radius
 
 float luminance(Vec3f c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
+/// Box around a part's box: no look at every vertex, and the same for every view.
+Bounds3d loose_bounds(const Scene& scene, const Part& part) {
+    Bounds3d bounds;
+    const Bounds3f& box = scene.meshes[part.mesh].bounds;
+    for (int i = 0; i < 8 && !box.empty(); ++i) bounds.extend(part.world_from_mesh.point(Vec3d(box.corner(i))));
+    return bounds;
+}
+
 Lamp default_key(const View& view) {
     const Affine3f& c = view.world_from_camera;
     Lamp key;
@@ -30,6 +38,19 @@ Lamp lamp_from(const Light& light, float scene_radius) {
     lamp.cos_outer = std::cos(std::clamp(light.outer_cone, 0.0f, kPi));
     lamp.cos_inner = std::max(std::cos(std::clamp(light.inner_cone, 0.0f, kPi)), lamp.cos_outer + 1e-4f);
     return lamp;
+}
+
+/// A file can bring thousands of lamps; each costs shadow rays in every pixel.
+void keep_strongest(std::vector<Lamp>& lamps, Vec3f middle, float radius) {
+    constexpr std::size_t kMost = 16;
+    if (lamps.size() <= kMost) return;
+    const auto power = [&](const Lamp& lamp) {
+        if (lamp.kind == Light::Kind::directional) return luminance(lamp.strength);
+        const Vec3f to = lamp.position - middle;
+        return luminance(lamp.strength) / (dot(to, to) + radius * radius);
+    };
+    std::stable_sort(lamps.begin(), lamps.end(), [&](const Lamp& a, const Lamp& b) { return power(a) > power(b); });
+    lamps.resize(kMost);
 }
 
 float smooth_ramp(float a, float b, float x) {
@@ -61,7 +82,8 @@ Incident incident(const Lamp& lamp, Vec3f point) {
 
 Lighting make_lighting(const Scene& scene, const View& view, float target_radius) {
     Lighting lighting;
-    const Bounds3d box = scene_bounds(scene);
+    Bounds3d box;
+    for (const Part& part : scene.parts) box.extend(loose_bounds(scene, part));
     const float radius = std::max(float(0.5 * box.diagonal()), 1e-12f);
     lighting.eye = view.eye();
     lighting.to_eye = -view.forward();
@@ -75,11 +97,12 @@ Lighting make_lighting(const Scene& scene, const View& view, float target_radius
         if (is_finite(lamp.strength) && is_finite(lamp.position) && luminance(lamp.strength) > 0)
             lighting.lamps.push_back(lamp);
     }
+    keep_strongest(lighting.lamps, Vec3f(box.center()), radius);
     // What the lamps give the middle of each part, larger parts counting more. A lamp right
     // beside a part must not darken all others: near distances count as a tenth of the scene.
     double sum = 0, weights = 0;
     for (std::size_t i = 0; i < scene.parts.size() && !lighting.lamps.empty(); ++i) {
-        const Bounds3d b = part_bounds(scene, PartId(i));
+        const Bounds3d b = loose_bounds(scene, scene.parts[i]);
         if (b.empty()) continue;
         const double weight = b.diagonal() * b.diagonal();
         const Vec3f middle(b.center());

@@ -23,7 +23,7 @@ struct Lamp {
 
 /// Light of one lamp at one point.
 struct Incident {
-    Vec3f direction;           ///< unit, towards the lamp
+    Vec3f direction; ///< unit, towards the lamp
     Vec3f strength{0, 0, 0};
     float distance = kInfinity;
 };
@@ -36,22 +36,21 @@ struct Lighting {
     Vec3f eye;                       ///< where the fill comes from
     Vec3f to_eye{0, 0, 1};           ///< orthographic views: its direction
     bool orthographic = false;
-    float ambient = 0.42f;           ///< strength of the hemisphere and of its mirror image
-    float ambient_shadow = 0.7f;     ///< how much full occlusion takes off the ambient light
-    float fill_shadow = 0.42f;       ///< and off the fill
-    float plain_radius = 1;          ///< reach of ambient occlusion, metres
-    float hole_radius = 1;           ///< the same inside the hole
+    float ambient = 0.42f;       ///< strength of the hemisphere and of its mirror image
+    float ambient_shadow = 0.7f; ///< how much full occlusion takes off the ambient light
+    float fill_shadow = 0.42f;   ///< and off the fill
+    float plain_radius = 1;      ///< reach of ambient occlusion, metres
+    float hole_radius = 1;       ///< the same inside the hole
 
-    [[nodiscard]] Vec3f to_fill(Vec3f point) const {
-        return orthographic ? to_eye : normalize(eye - point, to_eye);
-    }
+    [[nodiscard]] Vec3f to_fill(Vec3f point) const { return orthographic ? to_eye : normalize(eye - point, to_eye); }
 };
 
 /// The light for `view` of `scene`.
 ///
 /// Without lights in the file: a key from the upper left of the camera, soft. With lights:
 /// those replace the key, scaled together so that the parts get as much of them on average as
-/// the key would give; ambient light and fill stay, so that every model is legible.
+/// the key would give; ambient light and fill stay, so that every model is legible. Of more
+/// than 16 lights the strongest are taken.
 /// @param target_radius  bounding radius of the opened targets, metres; 0: none.
 [[nodiscard]] Lighting make_lighting(const Scene& scene, const View& view, float target_radius);
 

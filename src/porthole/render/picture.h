@@ -55,8 +55,9 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile);
 /// depth, brightness or colour.
 void find_edges(Picture& picture, Rect tile);
 
-/// Pass 4: traces the other samples of marked pixels and averages. Ambient light is borrowed
-/// from a neighbouring pixel that saw the same surface.
+/// Pass 4: traces the other samples of marked pixels and averages. What light reaches them is
+/// borrowed from a neighbouring pixel that saw the same surface, so that edges are as smooth as
+/// the surfaces beside them; traced only if there is none.
 void refine_tile(Picture& picture, const Stage& stage, Rect tile);
 
 } // namespace porthole

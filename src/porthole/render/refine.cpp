@@ -1,3 +1,5 @@
+#include <optional>
+
 #include "porthole/render/picture.h"
 
 namespace porthole {
@@ -6,8 +8,8 @@ namespace {
 
 constexpr float kBorrowNormal = 0.9f;
 
-/// Filtered ambient light of a neighbouring pixel on the same surface; negative if none.
-float borrow_ambient(const GBuffer& buffer, std::uint32_t key, Vec3f normal, float sx, float sy) {
+/// Filtered light of a neighbouring pixel on the same surface, if there is one.
+std::optional<Reach> borrow_light(const GBuffer& buffer, std::uint32_t key, Vec3f normal, float sx, float sy) {
     const int x = int(std::floor(sx)), y = int(std::floor(sy));
     // The sample's own pixel, then its neighbours, the side on which the sample lies first.
     const int hx = sx - float(x) < 0.5f ? -1 : 1, hy = sy - float(y) < 0.5f ? -1 : 1;
@@ -16,9 +18,9 @@ float borrow_ambient(const GBuffer& buffer, std::uint32_t key, Vec3f normal, flo
         const int px = x + d.x, py = y + d.y;
         if (!buffer.pixels.contains(px, py) || buffer.key(px, py) != key) continue;
         if (dot(unpack_normal(buffer.pixels(px, py).normal), normal) < kBorrowNormal) continue;
-        return float(buffer.ambient(px, py)) * (1.0f / 65535.0f);
+        return buffer.light(px, py).reach();
     }
-    return -1.0f;
+    return std::nullopt;
 }
 
 PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole, int pattern) {
@@ -56,42 +58,29 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
     const Seen16 seen = picture.camera.trace(samples, rays);
 
     const bool flat = picture.params.shading == Shading::flat;
-    std::array<SurfacePoint, kLanes> surface;
-    std::array<Asker, kLanes> askers;
-    std::array<std::size_t, kLanes> lane_of;
-    std::array<float, kLanes> ambient;
-    std::size_t n = 0;
     const std::uint32_t first = std::uint32_t(group_index) * kLanes;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
+        const std::uint32_t slot = first + std::uint32_t(i);
         state[i].in_hole |= seen.in_hole[i];
         if (seen.on_rim[i]) state[i].on_rim |= 1u << group_index;
         const Hit& hit = seen.hit[i];
         if (!hit.any()) {
-            shader.miss(first + std::uint32_t(i));
+            shader.miss(slot);
             continue;
         }
-        surface[i] = surface_point(stage.placements[index(hit.part)], hit, seen.direction[i]);
-        const SurfacePoint& p = surface[i];
-        // Each sample of a pixel looks at another part of the lamps.
+        const SurfacePoint p = surface_point(stage.placements[index(hit.part)], hit, seen.direction[i]);
+        // Each sample of a pixel takes another part of the patterns.
         const int pattern = cell_rank(pixels[i].x, pixels[i].y) + s * 5;
-        if (flat) {
-            shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], pattern), hit, p, {},
-                       seen.on_target[i]);
-            continue;
+        Reach reach;
+        if (!flat) {
+            const std::uint32_t key = GBuffer::key(hit.part, seen.in_hole[i]);
+            if (const auto light = borrow_light(buffer, key, p.normal, samples.x[i], samples.y[i]))
+                reach = *light;
+            else
+                reach = stage.occlusion.reach({p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern},
+                                              rays);
         }
-        askers[n] = {p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern};
-        const std::uint32_t key = index(hit.part) * 2 + (seen.in_hole[i] ? 1u : 0u);
-        ambient[n] = borrow_ambient(buffer, key, p.normal, samples.x[i], samples.y[i]);
-        lane_of[n++] = i;
-    }
-    if (n == 0) return;
-    std::array<Vec3f, kLanes> lamps;
-    stage.occlusion.lamps(std::span(askers.data(), n), 1, lamps.data(), rays);
-    for (std::size_t k = 0; k < n; ++k) {
-        const std::size_t i = lane_of[k];
-        const Reach reach = ambient[k] >= 0 ? Reach{lamps[k], ambient[k]} : stage.occlusion.reach(askers[k], rays);
-        shader.add(camera_path(seen.direction[i], first + std::uint32_t(i), seen.in_hole[i], askers[k].pattern),
-                   seen.hit[i], surface[i], reach, seen.on_target[i]);
+        shader.add(camera_path(seen.direction[i], slot, seen.in_hole[i], pattern), hit, p, reach, seen.on_target[i]);
     }
 }
 
@@ -118,7 +107,7 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
             const Vec3f direction = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
             const SurfacePoint point = surface_point(stage.placements[index(hit.part)], hit, direction);
             const Reach reach = flat ? Reach{} : filtered.reach(x, y);
-            buffer.ambient(x, y) = std::uint16_t(std::lround(clamp01(reach.ambient) * 65535.0f));
+            buffer.light(x, y) = PixelLight(reach);
             shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole), cell_rank(x, y)), hit, point, reach,
                        pixel.has(Pixel::on_target));
         }

@@ -48,7 +48,12 @@ struct Built {
     MeshBvhs meshes;
     Bvh bvh;
     explicit Built(Scene s)
-        : scene(std::move(s)), meshes(build_mesh_bvhs(scene)), bvh(build_bvh(meshes, all_parts(scene))) {}
+        : scene(padded(std::move(s))), meshes(build_mesh_bvhs(scene)), bvh(build_bvh(meshes, all_parts(scene))) {}
+    /// A copied scene has lost the room that Embree wants behind the vertices.
+    static Scene padded(Scene s) {
+        for (Mesh& mesh : s.meshes) mesh.positions.reserve(mesh.positions.size() + 1);
+        return s;
+    }
     Built(const Built&) = delete;
     Built& operator=(const Built&) = delete;
     [[nodiscard]] Frame draw(const View& view, const RenderParams& params = {}, int threads = 2) const {
@@ -306,6 +311,112 @@ TEST(Render, StopsWhenAsked) {
     EXPECT_THROW((void)render(b.bvh, nullptr, look_at({0, 1, 4}, {0, 0, 0}, 512, 512), {}, nullptr, nullptr, control),
                  Cancelled);
     EXPECT_LT(last, 0.3);
+}
+
+TEST(Render, AnEmptySceneGivesAnEmptyPicture) {
+    const Built b(Scene{});
+    const Frame f = b.draw(look_at({0, 0, 4}, {0, 0, 0}, 20, 10));
+    ASSERT_EQ(f.color.pixels().size(), 200u);
+    for (const Vec4f& c : f.color.pixels()) EXPECT_TRUE(same_color(c, {0, 0, 0, 0}));
+    for (const PartId id : f.ids.id.pixels()) EXPECT_EQ(id, kNoPart);
+}
+
+TEST(Render, MaskedTexelsArePassedThrough) {
+    Scene s;
+    s.materials = {matte({0.2f, 0.3f, 0.8f}), matte({0.8f, 0.1f, 0.1f})};
+    s.materials[0].unlit = s.materials[1].unlit = true;
+    s.materials[0].alpha_mode = AlphaMode::mask;
+    s.materials[0].base_color_texture.texture = 0;
+    Image<Rgba8> holes(2, 1, Rgba8{255, 255, 255, 255});
+    holes(1, 0).a = 0;
+    s.images = {holes};
+    Texture texture;
+    texture.image = 0, texture.nearest = true;
+    s.textures = {texture};
+    add_part(s, quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0), "leaf");
+    add_part(s, quad_mesh({-2, -2, -1}, {4, 0, 0}, {0, 4, 0}, 1), "wall");
+    const Frame f = Built(std::move(s)).draw(look_at({0, 0, 4}, {0, 0, 0}, 32, 32, 0.1f));
+    EXPECT_EQ(f.ids.id(8, 16), PartId{0});
+    EXPECT_EQ(f.ids.id(24, 16), PartId{1});
+    EXPECT_NEAR(f.color(8, 16).z, 0.8f, 1e-5f);
+    EXPECT_NEAR(f.color(24, 16).x, 0.8f, 1e-5f);
+}
+
+TEST(Render, TheFilesLightsReplaceTheKeyAtTheSameBrightness) {
+    const auto wall = [](float intensity, Vec3f from) {
+        Scene s;
+        s.materials = {matte({0.6f, 0.6f, 0.6f})};
+        add_part(s, quad_mesh({-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0), "wall");
+        if (intensity > 0) {
+            Light light;
+            light.kind = Light::Kind::point;
+            light.position = from;
+            light.intensity = intensity;
+            s.lights = {light};
+        }
+        RenderParams params;
+        params.ao_samples = 0;
+        return Built(std::move(s)).draw(look_at({0, 0, 4}, {0, 0, 0}, 33, 33, 0.4f), params).color;
+    };
+    const auto rig = wall(0, {}), dim = wall(1e-3f, {0, 0, 3}), bright = wall(1e6f, {0, 0, 3});
+    // Whatever its strength, and about as bright as the rig.
+    EXPECT_NEAR(dim(16, 16).y, bright(16, 16).y, 1e-4f);
+    EXPECT_NEAR(dim(16, 16).y, rig(16, 16).y, 0.12f);
+    // It falls off to the sides, which the rig does not.
+    EXPECT_GT(dim(16, 16).y, dim(1, 16).y + 0.02f);
+    // From one side, that side is brighter.
+    const auto left = wall(5, {-1.5f, 0, 1});
+    EXPECT_GT(left(4, 16).y, left(28, 16).y + 0.05f);
+}
+
+TEST(Render, AMirroredPartIsLitAsItsTwinIsInAMirror) {
+    // A bump whose normals matter: a sphere in a mirrored and in a plain placement.
+    Scene s;
+    s.materials = {matte({0.7f, 0.7f, 0.7f})};
+    s.materials[0].roughness = 0.4f;
+    const PartId plain = add_part(s, sphere_mesh({0, 0, 0}, 0.5f, 32, 0), "plain");
+    Part twin = s.parts[index(plain)];
+    twin.path = "twin";
+    twin.world_from_mesh = {{-1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}};
+    Scene mirrored = s;
+    mirrored.parts[0] = twin;
+    const View view = look_at({0, 0, 4}, {0, 0, 0}, 64, 64, 0.15f);
+    const Frame a = Built(std::move(s)).draw(view), b = Built(std::move(mirrored)).draw(view);
+    // The sphere is symmetric, so both pictures show the same, lit from the same side.
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) EXPECT_NEAR(a.color(x, y).y, b.color(x, y).y, 0.03f) << x << ' ' << y;
+    EXPECT_GT(a.color(20, 16).y, a.color(44, 48).y + 0.1f);
+}
+
+TEST(Render, GlassBendsWhatIsSeenThroughIt) {
+    // A slab of glass seen aslant shifts what stands behind it by what Snell's law says.
+    const auto edge = [](float thickness) {
+        Scene s;
+        s.materials = {matte({1, 1, 1}), matte({0.8f, 0.1f, 0.1f}), matte({0.1f, 0.1f, 0.8f})};
+        s.materials[0].transmission = 1, s.materials[0].roughness = 0, s.materials[0].ior = 1.5f;
+        s.materials[0].thickness = thickness;
+        s.materials[1].unlit = s.materials[2].unlit = true;
+        add_part(s, box_mesh({-3, -3, 0}, {3, 3, 0.5f}, 0), "slab");
+        add_part(s, quad_mesh({-9, -9, -1}, {9, 0, 0}, {0, 18, 0}, 1), "left");
+        add_part(s, quad_mesh({0, -9, -1}, {9, 0, 0}, {0, 18, 0}, 2), "right");
+        // 45 degrees, orthographic: every ray has the same angle.
+        View view = look_at({3, 0, 3}, {0, 0, 0}, 400, 8);
+        view.orthographic = true;
+        view.half_height = 0.02f;
+        RenderParams params;
+        params.samples = 1;
+        const Frame f = Built(std::move(s)).draw(view, params);
+        for (int x = 0; x < 400; ++x)
+            if (f.color(x, 4).z > f.color(x, 4).x) return (float(x) - 200) * view.pixel_scale();
+        return -1.0f;
+    };
+    // The closed box refracts; the border x = 0 at z = -1 is seen sideways by 1 / sqrt 2, less
+    // the slab's shift d sin(a) (1 - cos(a) / sqrt(n^2 - sin(a)^2)).
+    const float sin_a = std::sqrt(0.5f);
+    const float shift = 0.5f * sin_a * (1 - sin_a / std::sqrt(2.25f - 0.5f));
+    const float straight = 1 / std::sqrt(2.0f);
+    EXPECT_NEAR(edge(0.5f), straight - shift, 0.006f);
+    EXPECT_NEAR(edge(0.0f), straight - shift, 0.006f);
 }
 
 // A box inside a box; the hole is a disc, made by hand.
