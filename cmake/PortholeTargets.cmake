@@ -14,8 +14,10 @@ macro(porthole_find_dependencies)
   porthole_require(draco libdraco-dev)
   porthole_require(meshoptimizer libmeshoptimizer-dev)
   porthole_require(PNG libpng-dev)
-  porthole_require(libjpeg-turbo libturbojpeg0-dev)
   find_package(PkgConfig REQUIRED)
+  # By pkg-config: the package file of Debian's libturbojpeg0-dev also names libjpeg62-turbo,
+  # which it does not install.
+  pkg_check_modules(turbojpeg REQUIRED IMPORTED_TARGET libturbojpeg)
   pkg_check_modules(webp REQUIRED IMPORTED_TARGET libwebp)
 endmacro()
 
