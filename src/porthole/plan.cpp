@@ -213,8 +213,11 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
     plan.enclosing = enclosing_object(cut_bvh, view, plan.window, whole, control, plan.rays.enclosing);
 
+    Mask covered(plan.window, 0);
+    for (std::size_t i = 0; i < covered.pixels().size(); ++i)
+        covered.pixels()[i] = plan.spans.nearest.pixels()[i] < kInfinity;
     if (params.style == HoleStyle::paper) {
-        PaperHole grown = grow_hole_paper(paper, plan.target_ids, plan.enclosing, plan.depth_px);
+        PaperHole grown = grow_hole_paper(paper, plan.target_ids, plan.enclosing, plan.depth_px, covered);
         plan.hole = std::move(grown.hole);
         plan.paper_depth_px.assign(plan.opened.size(), 0);
         for (const PaperHole::PerTarget& t : grown.targets) {
@@ -222,9 +225,6 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
             if (it != plan.opened.end()) plan.paper_depth_px[std::size_t(it - plan.opened.begin())] = t.depth_px;
         }
     } else {
-        Mask covered(plan.window, 0);
-        for (std::size_t i = 0; i < covered.pixels().size(); ++i)
-            covered.pixels()[i] = plan.spans.nearest.pixels()[i] < kInfinity;
         plan.hole = grow_hole(plan.contours, plan.target_ids, covered, plan.enclosing, band);
     }
     plan.cut = make_cut(subject, view, plan.hole, plan.target_ids, plan.cut_set, cut_bvh, params.style, control,
