@@ -80,7 +80,7 @@ Incident incident(const Lamp& lamp, Vec3f point) {
     return in;
 }
 
-Lighting make_lighting(const Scene& scene, const View& view, float target_radius) {
+Lighting make_lighting(const Scene& scene, const View& view, std::span<const PartId> targets) {
     Lighting lighting;
     Bounds3d box;
     for (const Part& part : scene.parts) box.extend(loose_bounds(scene, part));
@@ -88,6 +88,9 @@ Lighting make_lighting(const Scene& scene, const View& view, float target_radius
     lighting.eye = view.eye();
     lighting.to_eye = -view.forward();
     lighting.orthographic = view.orthographic;
+    float target_radius = 0;
+    for (const PartId id : targets)
+        target_radius = std::max(target_radius, float(0.5 * loose_bounds(scene, scene.parts[index(id)]).diagonal()));
     lighting.plain_radius = 0.12f * radius;
     lighting.hole_radius =
         target_radius > 0 ? std::clamp(0.25f * target_radius, 0.02f * radius, 0.25f * radius) : lighting.plain_radius;

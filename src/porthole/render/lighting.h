@@ -2,6 +2,7 @@
 // how far ambient occlusion looks.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "porthole/base/view.h"
@@ -51,8 +52,10 @@ struct Lighting {
 /// those replace the key, scaled together so that the parts get as much of them on average as
 /// the key would give; ambient light and fill stay, so that every model is legible. Of more
 /// than 16 lights the strongest are taken.
-/// @param target_radius  bounding radius of the opened targets, metres; 0: none.
-[[nodiscard]] Lighting make_lighting(const Scene& scene, const View& view, float target_radius);
+/// Ambient occlusion reaches a quarter of the largest target's radius inside the hole, within
+/// 2 to 25 % of the scene's; 12 % elsewhere.
+/// @param targets  parts that are opened; may be empty.
+[[nodiscard]] Lighting make_lighting(const Scene& scene, const View& view, std::span<const PartId> targets);
 
 /// Irradiance from the sky on a surface with normal `n` (unit), as a multiple of albedo at
 /// ambient strength 1. World y is up.

@@ -1,5 +1,7 @@
 #include "porthole/render/render.h"
 
+#include <cassert>
+#include <new>
 #include <string>
 
 #include "porthole/render/emphasis.h"
@@ -12,13 +14,13 @@ namespace {
 void check(const RenderParams& p) {
     const auto in_range = [](const char* name, int value, int low, int high) {
         if (value >= low && value <= high) return;
-        throw Error(ErrorKind::usage, "E0130", name,
+        throw Error(ErrorKind::usage, "E0140", name,
                     std::to_string(value) + " is outside " + std::to_string(low) + ".." + std::to_string(high));
     };
     in_range("samples", p.samples, 1, 4096);
     in_range("ao_samples", p.ao_samples, 0, 256);
     in_range("max_bounces", p.max_bounces, 0, 64);
-    if (!(p.rim_px >= 0) || !(p.rim_px <= 100)) throw Error(ErrorKind::usage, "E0130", "rim_px", "outside 0..100");
+    if (!(p.rim_px >= 0) || !(p.rim_px <= 100)) throw Error(ErrorKind::usage, "E0140", "rim_px", "outside 0..100");
 }
 
 /// Runs one pass over all tiles and reports its share of the work.
@@ -47,10 +49,13 @@ private:
     double base_ = 0;
 };
 
-void draw(Picture& picture, const Bvh& bvh, const Cut* cut, const Control& control) {
+void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, const Control& control) {
     const Scene& scene = bvh.scene();
     const RenderParams& params = picture.params;
-    const Lighting lighting = make_lighting(scene, picture.view, params.target_radius);
+    std::vector<PartId> opened;
+    for (const PartId id : all_parts(scene))
+        if (targets && targets->holds(id)) opened.push_back(id);
+    const Lighting lighting = make_lighting(scene, picture.view, opened);
     const Occlusion occlusion(bvh, cut, lighting, params);
     const std::vector<Placement> placements = make_placements(scene);
     Passes passes(picture.buffer.window(), control);
@@ -66,27 +71,24 @@ void draw(Picture& picture, const Bvh& bvh, const Cut* cut, const Control& contr
     }
 }
 
-} // namespace
+Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, const Control& control) {
+    const Camera camera(bvh, nullptr, view, nullptr, 0);
+    Picture picture(view, params, camera, view.window());
+    mark_everything(picture);
+    draw(picture, bvh, nullptr, nullptr, control);
+    return {std::move(picture.color), std::move(picture.buffer.ids), picture.rays.get()};
+}
 
-Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* cut,
-             const Frame* under, const Control& control) {
-    check(params);
-    if (!cut) {
-        const Camera camera(bvh, nullptr, view, nullptr, 0);
-        Picture picture(view, params, camera, view.window());
-        mark_everything(picture);
-        draw(picture, bvh, nullptr, control);
-        return {std::move(picture.color), std::move(picture.buffer.ids), picture.rays.get()};
-    }
-
-    Frame frame = *under;
+Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut& cut,
+                const Frame& under, const Control& control) {
+    Frame frame = under;
     frame.rays = {};
-    const Rect window = cut->empty() ? Rect{} : hole_window(*cut, view);
+    const Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
     if (window.empty()) return frame;
-    const Camera camera(bvh, targets, view, cut, params.shading == Shading::flat ? 0.0f : params.rim_px);
+    const Camera camera(bvh, targets, view, &cut, params.shading == Shading::flat ? 0.0f : params.rim_px);
     Picture picture(view, params, camera, window);
-    mark_hole(picture, *cut);
-    draw(picture, bvh, cut, control);
+    mark_hole(picture, cut);
+    draw(picture, bvh, targets, &cut, control);
     // Only pixels with a sample in the hole change; the others stay the plain picture's.
     for (int y = window.y0; y < window.y1; ++y)
         for (int x = window.x0; x < window.x1; ++x) {
@@ -99,6 +101,22 @@ Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderP
         }
     frame.rays = picture.rays.get();
     return frame;
+}
+
+} // namespace
+
+Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* cut,
+             const Frame* under, const Control& control) {
+    check(params);
+    assert(!cut == !under);
+    try {
+        return cut ? draw_hole(bvh, targets, view, params, *cut, *under, control)
+                   : draw_plain(bvh, view, params, control);
+    } catch (const std::bad_alloc&) {
+        throw Error(ErrorKind::limit, "E0902", "render",
+                    "memory ran out for a picture of " + std::to_string(view.width) + " x " +
+                        std::to_string(view.height));
+    }
 }
 
 } // namespace porthole

@@ -27,8 +27,6 @@ struct RenderParams {
     float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, [0, 100]; without it, shells of
                          ///< one colour swallow the hole. Never on a target; none with flat shading
     Vec3f background{1, 1, 1}; ///< linear; seen, tinted, through coloured glass
-    float target_radius =
-        0; ///< of the targets' bounding sphere, metres: scales ambient occlusion inside the hole; 0: unknown
 };
 
 struct RayCounts {
@@ -59,7 +57,8 @@ struct Frame {
 /// @param cut      may be null.
 /// @param under    plain frame of the same view and params; null exactly when `cut` is.
 /// @return colour, ids at pixel centres, rays spent (of this call).
-/// @throws Error usage E0130 when a parameter is out of range; Cancelled.
+/// @throws Error usage E0140 when a parameter is out of range; limit E0902 when memory runs out;
+///         Cancelled.
 /// The same bits for any number of threads. Reports progress as stage "render".
 /// Cost: 1920x1080 of an assembly of 500 thousand triangles takes about 0.6 CPU-seconds; 34
 /// bytes a pixel of the picture (with a cut: of the hole's box) on top of the frame while it runs.

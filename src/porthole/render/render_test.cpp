@@ -289,7 +289,7 @@ TEST(Render, BadParametersAreNamed) {
         (void)b.draw(view, params);
         FAIL();
     } catch (const Error& e) {
-        EXPECT_EQ(e.code, "E0130");
+        EXPECT_EQ(e.code, "E0140");
         EXPECT_EQ(e.where, "samples");
         EXPECT_EQ(e.kind, ErrorKind::usage);
     }
