@@ -21,9 +21,10 @@ Vec3f absorption(const Material& m, float distance) {
     return {keep(m.attenuation_color.x), keep(m.attenuation_color.y), keep(m.attenuation_color.z)};
 }
 
-/// Whether light bends in the surface: a body with thickness, or a closed shell.
-bool bends(const Material& m, const Placement& placement) {
-    return m.transmission > 0 && (m.thickness > 0 || placement.closed);
+/// Whether light bends in the surface: in a body with thickness. Without one glTF means a thin
+/// sheet, and an insect in amber is better seen than its refractions.
+bool bends(const Material& m) {
+    return m.transmission > 0 && m.thickness > 0;
 }
 
 /// The colour that light takes on where it passes the surface. Of a blended body alpha says
@@ -106,7 +107,7 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
         return;
     }
 
-    const bool body = bends(*s.material, placement);
+    const bool body = bends(*s.material);
     // A blended body is seen through by refraction alone; a straight view would be a second image.
     const float coverage = body ? 1.0f : s.coverage;
     const Vec3f weight = ray.weight * coverage;

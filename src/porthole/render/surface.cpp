@@ -1,7 +1,6 @@
 #include "porthole/render/surface.h"
 
 #include "porthole/render/bxdf.h"
-#include "porthole/scene/closed.h"
 #include "porthole/scene/texture.h"
 
 namespace porthole {
@@ -54,7 +53,6 @@ Vec3f tinted(Vec3f color, Tint tint) {
 }
 
 std::vector<Placement> make_placements(const Scene& scene) {
-    std::vector<std::int8_t> closed(scene.meshes.size(), -1);
     std::vector<Placement> placements(scene.parts.size());
     for (std::size_t i = 0; i < placements.size(); ++i) {
         const Part& part = scene.parts[i];
@@ -73,13 +71,6 @@ std::vector<Placement> make_placements(const Scene& scene) {
         const float mesh_size =
             mesh.bounds.empty() ? 0 : std::max(largest(mesh.bounds.lower), largest(mesh.bounds.upper));
         p.offset = 4e-6f * (largest(m.p) + stretch * mesh_size);
-
-        bool transmits = false;
-        for (const Submesh& s : mesh.submeshes) transmits |= scene.materials[s.material].transmission > 0;
-        if (!transmits) continue;
-        std::int8_t& known = closed[part.mesh];
-        if (known < 0) known = closedness(mesh).closed ? 1 : 0;
-        p.closed = known == 1;
     }
     return placements;
 }

@@ -23,7 +23,6 @@ struct Placement {
     Vec3f nx, ny, nz; ///< columns that turn an outward mesh normal into an outward world normal
     const Mesh* mesh = nullptr;
     float offset = 0;    ///< how far secondary rays start off the surface, metres
-    bool closed = false; ///< a transmissive part whose surface is closed: light bends in it
 };
 
 /// Placements of all parts of a scene; keeps pointers into it.
