@@ -28,7 +28,8 @@ target_compile_options(porthole_flags INTERFACE -Wall -Wextra -Wpedantic -Wshado
                        -fno-semantic-interposition)
 if(PORTHOLE_SANITIZE)
   target_compile_options(porthole_flags INTERFACE -fsanitize=${PORTHOLE_SANITIZE} -fno-omit-frame-pointer
-                         -fno-sanitize-recover=all)
+                         -fno-sanitize-recover=all
+                         -Wno-maybe-uninitialized) # GCC 12 sees it in std::regex, under sanitizers only
   target_link_options(porthole_flags INTERFACE -fsanitize=${PORTHOLE_SANITIZE})
 endif()
 
