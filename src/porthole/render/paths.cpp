@@ -23,9 +23,7 @@ Vec3f absorption(const Material& m, float distance) {
 
 /// Whether light bends in the surface: in a body with thickness. Without one glTF means a thin
 /// sheet, and an insect in amber is better seen than its refractions.
-bool bends(const Material& m) {
-    return m.transmission > 0 && m.thickness > 0;
-}
+bool bends(const Material& m) { return m.transmission > 0 && m.thickness > 0; }
 
 /// The colour that light takes on where it passes the surface. Of a blended body alpha says
 /// how strong it is: such bodies are drawn as two blended sheets elsewhere.
@@ -35,8 +33,8 @@ Vec3f surface_tint(const Substance& s, bool body) {
     return root(lerp(Vec3f{1, 1, 1}, color, std::sqrt(s.coverage))); // once on the way in, once out
 }
 
-/// Frosted glass spreads a camera ray into this many.
-constexpr int kSpread = 16;
+/// Frosted glass spreads a camera ray into this many; where samples are averaged, into fewer.
+constexpr int kSpread = 16, kSpreadAveraged = 4;
 constexpr float kFrosted = 0.1f; ///< roughness from which glass is frosted
 
 float least_weight(const PathRay& ray) { return ray.spread ? kLeastWeight / kSpread : kLeastWeight; }
@@ -151,17 +149,18 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
     ++next.bounce;
     next.origin = point.beyond;
     // Only the first surface spreads the ray: one blur stands for both sides.
-    const int spread = !ray.spread && ray.through && is_frosted(s) ? kSpread : 1;
+    const int spread = !ray.spread && ray.through && is_frosted(s) ? (averaged_ ? kSpreadAveraged : kSpread) : 1;
     next.spread |= spread > 1;
     const auto facet = [&](int i) {
         if (spread == 1) return normal;
-        const int n = kSpread * kCellPixels;
+        const int n = spread * kCellPixels;
         return facet_normal(normal, s.roughness * s.roughness, i * kCellPixels + ray.pattern % kCellPixels, n);
     };
     if (!body) {
         const float mirrored = fresnel_dielectric(cosine, std::max(1.0f, s.material->ior));
         next.weight = weight * surface_tint(s, false) * ((1.0f - mirrored) / float(spread));
         for (int i = 0; i < spread; ++i) {
+            next.pattern = ray.pattern + i;
             // A sheet sends on what its facets would mirror, to the other side.
             if (spread > 1) {
                 const Vec3f r = reflect(ray.direction, facet(i));
@@ -185,6 +184,7 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
     const auto direction = refract(ray.direction, normal, eta);
     next.weight = weight * surface_tint(s, true) * ((1.0f - mirrored) / float(spread));
     for (int i = 0; i < spread && direction; ++i) {
+        next.pattern = ray.pattern + i;
         next.direction = refract(ray.direction, facet(i), eta).value_or(*direction);
         push(next);
     }
@@ -232,6 +232,7 @@ void Shader::trace_newest() {
     std::array<Asker, kLanes> askers;
     std::array<int, kLanes> asker_of; ///< -1: nothing to shade
     std::size_t asking = 0;
+    bool all_spread = true; // sixteen of them make one sample: they are averaged as well
     for (int i = 0; i < int(n); ++i) {
         PathRay& ray = rays[std::size_t(i)];
         asker_of[std::size_t(i)] = -1;
@@ -255,18 +256,19 @@ void Shader::trace_newest() {
         asker_of[std::size_t(i)] = kLanes; // shaded as fully lit
         if (m.unlit || clear) continue;
         asker_of[std::size_t(i)] = int(asking);
+        all_spread &= ray.spread;
         askers[asking++] = {p.position, p.start, p.flat_normal, p.normal, ray.in_hole, ray.pattern};
     }
     std::array<Reach, kLanes + 1> reach;
-    reach_of(std::span(askers.data(), asking), reach.data());
+    reach_of(std::span(askers.data(), asking), averaged_ || all_spread, reach.data());
     reach[kLanes] = {};
     for (std::size_t i = 0; i < n; ++i)
         if (asker_of[i] >= 0) add(rays[i], hit[i], surface[i], reach[std::size_t(asker_of[i])], false);
 }
 
-void Shader::reach_of(std::span<const Asker> points, Reach* reach) {
+void Shader::reach_of(std::span<const Asker> points, bool averaged, Reach* reach) {
     const Occlusion& occlusion = stage_->occlusion;
-    if (!averaged_) {
+    if (!averaged) {
         for (std::size_t i = 0; i < points.size(); ++i) reach[i] = occlusion.reach(points[i], *rays_);
         return;
     }

@@ -88,7 +88,7 @@ private:
     void push(const PathRay& ray);
     void end_in_surroundings(const PathRay& ray);
     void trace_newest();
-    void reach_of(std::span<const Asker> points, Reach* reach);
+    void reach_of(std::span<const Asker> points, bool averaged, Reach* reach);
 
     const Stage* stage_;
     std::vector<Radiance> radiance_;
