@@ -112,9 +112,9 @@ Rect projected_rect(const Bounds3f& box, const Affine3d& camera_from_mesh, const
     return Rect{pixel(x0) - 1, pixel(y0) - 1, pixel(x1) + 2, pixel(y1) + 2}.intersected(window);
 }
 
-} // namespace
-
-IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
+/// Ids of the marked blocks of `window`, of all of them without `blocks`.
+IdBuffer traced_ids(const Bvh& bvh, const View& view, Rect window, const BlockMask* blocks, const Control& control,
+                    std::int64_t* rays) {
     IdBuffer ids(window);
     std::atomic<std::int64_t> traced{0};
     parallel_for_tiles(window, kTile, control, [&](Rect tile) {
@@ -122,6 +122,7 @@ IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control&
         float depth_per_t[kLanes];
         std::int64_t n = 0;
         for_each_block(tile, [&](int x0, int y0) {
+            if (blocks && !blocks->marked(floor_div4(x0), floor_div4(y0))) return;
             n += set_block_rays(packet, depth_per_t, view, x0, y0, tile);
             intersect(bvh, packet, Coherence::coherent);
             store_ids(packet, depth_per_t, x0, y0, ids);
@@ -130,6 +131,12 @@ IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control&
     });
     add(rays, traced);
     return ids;
+}
+
+} // namespace
+
+IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
+    return traced_ids(bvh, view, window, nullptr, control, rays);
 }
 
 ClusterBoxes cluster_boxes(const Scene& scene, std::span<const PartId> parts, const Control& control) {
@@ -171,22 +178,7 @@ BlockMask mark_blocks(const Scene& scene, std::span<const PartId> parts, const C
 
 IdBuffer trace_ids_in_blocks(const Bvh& bvh, const View& view, Rect window, const BlockMask& blocks,
                              const Control& control, std::int64_t* rays) {
-    IdBuffer ids(window);
-    std::atomic<std::int64_t> traced{0};
-    parallel_for_tiles(window, kTile, control, [&](Rect tile) {
-        RayHit16 packet;
-        float depth_per_t[kLanes];
-        std::int64_t n = 0;
-        for_each_block(tile, [&](int x0, int y0) {
-            if (!blocks.marked(floor_div4(x0), floor_div4(y0))) return;
-            n += set_block_rays(packet, depth_per_t, view, x0, y0, tile);
-            intersect(bvh, packet, Coherence::coherent);
-            store_ids(packet, depth_per_t, x0, y0, ids);
-        });
-        traced += n;
-    });
-    add(rays, traced);
-    return ids;
+    return traced_ids(bvh, view, window, &blocks, control, rays);
 }
 
 std::vector<PartId> trace_ids_at(const Bvh& bvh, const View& view, std::span<const Vec2i> pixels) {
