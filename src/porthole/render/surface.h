@@ -22,7 +22,7 @@ struct Placement {
     Affine3f world_from_mesh;
     Vec3f nx, ny, nz; ///< columns that turn an outward mesh normal into an outward world normal
     const Mesh* mesh = nullptr;
-    float offset = 0;    ///< how far secondary rays start off the surface, metres
+    float offset = 0; ///< how far secondary rays start off the surface, metres
 };
 
 /// Placements of all parts of a scene; keeps pointers into it.
