@@ -69,7 +69,7 @@ struct Submesh {
 /// are empty or as long as `positions`.
 struct Mesh {
     std::string name;
-    std::vector<Vec3f> positions; ///< finite; capacity at least size() + 1 (Embree reads 16 bytes per vertex)
+    std::vector<Vec3f> positions; ///< finite; with capacity for one more, Embree shares them, else it copies
     std::vector<Vec3u> triangles; ///< indices below positions.size()
     std::vector<Vec3f> normals;   ///< unit length; empty: shaded flat
     std::vector<Vec4f> tangents;  ///< xyz unit length, w = handedness

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <cstddef>
 #include <cstring>
 #include <numeric>
@@ -246,11 +245,16 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
         const RTCDevice device = state->device.value;
         state->kinds[i] = surface_kind(scene, mesh);
         state->hashes[i] = shape_hash(mesh);
-        assert(mesh.positions.capacity() > mesh.positions.size());
 
         const GeometryHandle geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-        rtcSetSharedGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.positions.data(),
-                                   0, sizeof(Vec3f), mesh.positions.size());
+        // Embree reads 16 bytes at the last vertex. A copied Scene has lost the room for that.
+        if (const std::size_t n = mesh.positions.size(); mesh.positions.capacity() > n) {
+            rtcSetSharedGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                       mesh.positions.data(), 0, sizeof(Vec3f), n);
+        } else if (void* copy = rtcSetNewGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                        sizeof(Vec3f), n)) {
+            std::memcpy(copy, mesh.positions.data(), n * sizeof(Vec3f));
+        }
         rtcSetSharedGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                                    sizeof(Vec3u), mesh.triangles.size());
         rtcSetGeometryUserData(geometry.value, reinterpret_cast<void*>(std::uintptr_t(state->kinds[i])));
