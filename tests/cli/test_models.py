@@ -1,4 +1,4 @@
-"""The command line on the real models of $PORTHOLE_SHARED; skipped without them."""
+"""The command line on the real models of $PORTHOLE_SHARED (default: ../shared beside the checkout); skipped without them."""
 
 import json
 import os
@@ -6,7 +6,8 @@ import sys
 
 from harness import Case, main, run
 
-SHARED = os.path.join(os.environ.get("PORTHOLE_SHARED", ""), "models")
+BESIDE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..", "shared")
+SHARED = os.path.join(os.environ.get("PORTHOLE_SHARED") or BESIDE, "models")
 
 # From the models' own README: parts, and triangles before those without area are left out.
 MODELS = {
