@@ -52,7 +52,7 @@ std::uint64_t hash_bytes(std::uint64_t h, const void* data, std::size_t n) {
         h = mixed(h, v);
     }
     std::uint64_t tail = 0;
-    std::memcpy(&tail, bytes + i, n - i);
+    if (i < n) std::memcpy(&tail, bytes + i, n - i); // an empty mesh has no bytes to point at
     return mixed(h, tail ^ (std::uint64_t(n) << 32));
 }
 
@@ -253,7 +253,7 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
                                        mesh.positions.data(), 0, sizeof(Vec3f), n);
         } else if (void* copy = rtcSetNewGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                         sizeof(Vec3f), n)) {
-            std::memcpy(copy, mesh.positions.data(), n * sizeof(Vec3f));
+            if (n > 0) std::memcpy(copy, mesh.positions.data(), n * sizeof(Vec3f));
         }
         rtcSetSharedGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                                    sizeof(Vec3u), mesh.triangles.size());
