@@ -177,10 +177,7 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
             continue;
         }
         if (query.visit_call) {
-            const float facing = RTCHitN_Ng_x(args->hit, args->N, i) * RTCRayN_dir_x(args->ray, args->N, i) +
-                                 RTCHitN_Ng_y(args->hit, args->N, i) * RTCRayN_dir_y(args->ray, args->N, i) +
-                                 RTCHitN_Ng_z(args->hit, args->N, i) * RTCRayN_dir_z(args->ray, args->N, i);
-            query.visit_call(query.visit, {c.lane, c.part, c.t, facing < 0});
+            query.visit_call(query.visit, {c.lane, c.part, c.t});
             args->valid[i] = 0;
             continue;
         }

@@ -119,7 +119,6 @@ struct Crossing {
     int lane = 0;
     PartId part = kNoPart;
     float t = 0;
-    bool entering = false; ///< through the front of a triangle, by the mesh's own winding
 };
 
 /// Calls visit(Crossing) for every surface that the active lanes cross between tnear and tfar,
