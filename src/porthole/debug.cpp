@@ -77,7 +77,7 @@ Image<Rgba8> drawn_widths(const ViewPlan& plan) {
 
 std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* before, const Frame* after) {
     std::vector<NamedPicture> pictures;
-    const auto add = [&](const char* name, Image<Rgba8> picture) {
+    const auto add = [&](const std::string& name, Image<Rgba8> picture) {
         if (!picture.empty()) pictures.push_back({name, std::move(picture)});
     };
     if (before) add("01-parts-before", drawn_ids(before->ids.id));
@@ -93,7 +93,12 @@ std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* befo
         add("10-distance", drawn_distance(plan.hole.distance));
         add("11-floor-depth", drawn_depth(plan.hole.floor_depth));
     }
-    add("12-cut-depth", drawn_depth(plan.cut.cut_depth));
+    for (std::size_t level = 0; level < plan.cut.levels.size(); ++level) {
+        Image<float> depth(plan.window, kInfinity);
+        for (std::size_t i = 0; i < depth.pixels().size(); ++i)
+            depth.pixels()[i] = plan.cut.levels[level].pixels()[i].depth(-plan.cut.distance.pixels()[i]);
+        add("12-cut-depth-" + std::to_string(level), drawn_depth(depth));
+    }
     add("13-loose-depth", drawn_depth(plan.cut.loose_depth));
     if (after) add("14-parts-after", drawn_ids(after->ids.id));
     if (after) add("15-depth-after", drawn_depth(after->ids.depth));

@@ -138,24 +138,33 @@ Cut make_cut(const Subject& subject, const View& view, const Hole& hole, const I
     for (const PartId id : cut_set) cut.role[index(id)] = CutRole::cut_set;
 
     cut.distance = hole.distance;
-    cut.cut_depth = hole.floor_depth;
+    Image<float> cut_depth = hole.floor_depth;
     cut.loose_depth = Image<float>(hole.window, -kInfinity);
-    if (style == HoleStyle::paper) return cut; // occluders go along the whole ray, nothing else does
+    const auto straight = [&] {
+        CutLevel& level = cut.levels.emplace_back(hole.window);
+        for (std::size_t i = 0; i < level.pixels().size(); ++i)
+            if (hole.mask.pixels()[i]) level.pixels()[i].floor = cut_depth.pixels()[i];
+    };
+    if (style == HoleStyle::paper) { // occluders go along the whole ray, nothing else does
+        straight();
+        return cut;
+    }
 
     for (std::size_t i = 0; i < targets.id.pixels().size(); ++i)
-        if (targets.id.pixels()[i] != kNoPart) cut.cut_depth.pixels()[i] = targets.depth.pixels()[i];
+        if (targets.id.pixels()[i] != kNoPart) cut_depth.pixels()[i] = targets.depth.pixels()[i];
     for (std::size_t i = 0; i < hole.mask.pixels().size(); ++i)
-        if (!hole.mask.pixels()[i]) cut.cut_depth.pixels()[i] = -kInfinity;
-    cut.loose_depth = trace_farthest(cut_bvh, view, hole.mask, cut.cut_depth, control, &rays);
+        if (!hole.mask.pixels()[i]) cut_depth.pixels()[i] = -kInfinity;
+    cut.loose_depth = trace_farthest(cut_bvh, view, hole.mask, cut_depth, control, &rays);
 
     // Where nothing would be left to see, the last surface that was to go stays: no hole shows
     // the background through the object, so the object keeps its outline.
-    const Mask left = trace_beyond(subject.whole, view, hole.mask, cut.cut_depth, control, &rays);
+    const Mask left = trace_beyond(subject.whole, view, hole.mask, cut_depth, control, &rays);
     for (std::size_t i = 0; i < left.pixels().size(); ++i) {
         if (left.pixels()[i] || !hole.mask.pixels()[i] || targets.id.pixels()[i] != kNoPart) continue;
         const float last = cut.loose_depth.pixels()[i] * (1 - 1e-6f);
-        cut.cut_depth.pixels()[i] = cut.loose_depth.pixels()[i] = last;
+        cut_depth.pixels()[i] = cut.loose_depth.pixels()[i] = last;
     }
+    straight();
     return cut;
 }
 

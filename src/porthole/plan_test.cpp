@@ -17,7 +17,7 @@ using test::look;
 bool same(const ViewPlan& a, const ViewPlan& b) {
     if (!(a.target_ids == b.target_ids) || !(a.hole.mask == b.hole.mask) || !(a.hole.distance == b.hole.distance))
         return false;
-    if (!(a.cut.cut_depth == b.cut.cut_depth) || !(a.cut.loose_depth == b.cut.loose_depth)) return false;
+    if (!(a.cut.levels == b.cut.levels) || !(a.cut.loose_depth == b.cut.loose_depth)) return false;
     if (a.contours.size() != b.contours.size() || a.cut.role != b.cut.role) return false;
     for (std::size_t i = 0; i < a.contours.size(); ++i)
         if (a.contours[i].pixels != b.contours[i].pixels) return false;

@@ -133,7 +133,7 @@ std::optional<double> wall_visible(const Subject& subject, const ViewPlan& plan,
         for (int x = window.x0; x < window.x1; ++x) {
             const PartId id = after.ids.id(x, y);
             band(x, y) = plan.hole.mask(x, y) && id != kNoPart && plan.cut.role[index(id)] == CutRole::cut_set;
-            from(x, y) = plan.cut.cut_depth(x, y);
+            if (band(x, y)) from(x, y) = plan.cut.levels[plan.cut.level_of(id)](x, y).depth(-plan.cut.distance(x, y));
             seen(x, y) = after.ids.depth(x, y);
         }
     const Bvh cut_set = build_bvh(*subject.meshes, plan.cut_set);

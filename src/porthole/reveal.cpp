@@ -57,7 +57,7 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
     // The plain picture first; the hole is drawn over it, so nothing changes outside.
     RenderParams look = params.render;
     if (params.plan.style == HoleStyle::paper) look.shading = Shading::flat;
-    const Bvh opened = build_bvh(meshes, all_parts(scene), revealed.plan.cut.role);
+    const Bvh opened = build_bvh(meshes, all_parts(scene), revealed.plan.cut.role, revealed.plan.cut.level);
     Frame plain;
     if (!revealed.plan.nothing_revealed()) {
         plain = render(subject.whole, nullptr, view, look, nullptr, nullptr, control);

@@ -37,10 +37,12 @@ IdBuffer opened_ids(const ViewPlan& plan, const IdBuffer& before) {
                 after.id(x, y) = plan.target_ids.id(x, y);
                 after.depth(x, y) = plan.target_ids.depth(x, y);
             } else if (plan.hole.mask(x, y) && before.id(x, y) != kNoPart) {
-                const CutRole role = plan.cut.role[index(before.id(x, y))];
-                const float limit = role == CutRole::fixed     ? -kInfinity
-                                    : role == CutRole::cut_set ? plan.cut.cut_depth(x, y)
-                                                               : plan.cut.loose_depth(x, y);
+                const PartId id = before.id(x, y);
+                const CutRole role = plan.cut.role[index(id)];
+                const float limit = role == CutRole::fixed ? -kInfinity
+                                    : role == CutRole::cut_set
+                                        ? plan.cut.levels[plan.cut.level_of(id)](x, y).depth(-plan.cut.distance(x, y))
+                                        : plan.cut.loose_depth(x, y);
                 if (before.depth(x, y) < limit) after.id(x, y) = kNoPart, after.depth(x, y) = kInfinity;
             }
         }

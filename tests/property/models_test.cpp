@@ -105,7 +105,7 @@ TEST_P(Models, ExactEqualsFullFromRandomDirections) {
             ASSERT_EQ(exact.contours[i].pixels, full.contours[i].pixels);
         ASSERT_EQ(exact.hole.mask, full.hole.mask);
         ASSERT_EQ(exact.hole.distance, full.hole.distance);
-        ASSERT_EQ(exact.cut.cut_depth, full.cut.cut_depth);
+        ASSERT_EQ(exact.cut.levels, full.cut.levels);
         ASSERT_EQ(exact.cut.loose_depth, full.cut.loose_depth);
         ASSERT_EQ(drawn(subject, exact, look).color, drawn(subject, full, look).color);
         opened += !exact.cut.empty();

@@ -22,23 +22,71 @@ float Cut::distance_at(float x, float y) const {
     return top * (1 - ay) + bottom * ay;
 }
 
-float Cut::depth_at(float x, float y, CutRole which) const {
-    if (which == CutRole::fixed) return -kInfinity;
+namespace {
+
+/// The pixel of the hole that is nearest to a point whose own pixel's centre lies outside; the
+/// own pixel if there is none.
+Vec2i nearest_inside(const Image<float>& distance, float x, float y) {
     const int ix = int(std::floor(x)), iy = int(std::floor(y));
-    const Image<float>& depths = which == CutRole::cut_set ? cut_depth : loose_depth;
-    const float own = depths.at_or(ix, iy, -kInfinity);
-    if (distance.at_or(ix, iy, 1.0f) <= 0) return own;
-    // A sample inside the rim whose pixel's centre is outside: the neighbour across the rim
-    // that is nearest to the sample knows the depth.
-    float best = kInfinity, depth = own;
+    Vec2i nearest{ix, iy};
+    if (distance.at_or(ix, iy, 1.0f) <= 0) return nearest;
+    float best = kInfinity;
     for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx) {
             if (distance.at_or(ix + dx, iy + dy, 1.0f) > 0) continue;
             const float ex = float(ix + dx) + 0.5f - x, ey = float(iy + dy) + 0.5f - y;
             const float d2 = ex * ex + ey * ey;
-            if (d2 < best) best = d2, depth = depths(ix + dx, iy + dy);
+            if (d2 < best) best = d2, nearest = {ix + dx, iy + dy};
         }
-    return depth;
+    return nearest;
+}
+
+/// Floors that differ by more pixel sizes than this are a step, not a slope.
+constexpr float kStep = 16;
+
+} // namespace
+
+CutDepth Cut::depth_at(float x, float y, std::size_t which) const {
+    const CutLevel& profiles = levels[which];
+    const float inside = -distance_at(x, y);
+    const auto result = [&](const CutProfile& p) { return CutDepth{p.depth(inside), p.on_chamfer(inside)}; };
+    const float gx = x - 0.5f, gy = y - 0.5f;
+    const float fx = std::floor(gx), fy = std::floor(gy);
+    const int ix = int(fx), iy = int(fy);
+    const float ax = gx - fx, ay = gy - fy;
+    const float weights[4] = {(1 - ax) * (1 - ay), ax * (1 - ay), (1 - ax) * ay, ax * ay};
+    CutProfile mean{0, 0, 0, 0, 0};
+    float sum = 0, front_sum = 0, nearest_floor = kInfinity, farthest_floor = -kInfinity;
+    for (int i = 0; i < 4; ++i) {
+        const int px = ix + (i & 1), py = iy + (i >> 1);
+        if (!(weights[i] > 0) || !profiles.contains(px, py)) continue;
+        const CutProfile& p = profiles(px, py);
+        if (p.floor == -kInfinity) continue;
+        if (weights[i] == 1.0f) return result(p);
+        sum += weights[i];
+        mean.start += weights[i] * p.start, mean.width += weights[i] * p.width;
+        if (p.floor < nearest_floor) nearest_floor = p.floor;
+        if (p.floor > farthest_floor) farthest_floor = p.floor;
+        mean.floor += weights[i] * p.floor;
+        if (p.front == -kInfinity) continue;
+        front_sum += weights[i];
+        mean.front += weights[i] * p.front, mean.slope += weights[i] * p.slope;
+    }
+    if (sum > 0 && !(farthest_floor - nearest_floor > kStep * view.pixel_size(nearest_floor))) {
+        mean.start /= sum, mean.width /= sum, mean.floor /= sum;
+        if (front_sum > 0)
+            mean.front /= front_sum, mean.slope /= front_sum;
+        else
+            mean.front = -kInfinity, mean.width = 0;
+        return result(mean);
+    }
+    const Vec2i own = nearest_inside(distance, x, y);
+    return profiles.contains(own.x, own.y) ? result(profiles(own.x, own.y)) : CutDepth{};
+}
+
+float Cut::loose_depth_at(float x, float y) const {
+    const Vec2i own = nearest_inside(distance, x, y);
+    return loose_depth.at_or(own.x, own.y, -kInfinity);
 }
 
 bool Cut::removes(Vec3f world, PartId part) const {
@@ -48,7 +96,7 @@ bool Cut::removes(Vec3f world, PartId part) const {
     if (!(p.depth > 0) && !view.orthographic) return false;
     if (!(std::abs(p.x) < 1e8f) || !(std::abs(p.y) < 1e8f)) return false;
     if (distance_at(p.x, p.y) > 0) return false;
-    return p.depth < depth_at(p.x, p.y, which);
+    return p.depth < (which == CutRole::loose ? loose_depth_at(p.x, p.y) : depth_at(p.x, p.y, level_of(part)).depth);
 }
 
 } // namespace porthole

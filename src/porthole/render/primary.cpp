@@ -92,27 +92,31 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         }
     }
 
-    float kept[kLanes], cut_set[kLanes], loose[kLanes]; // where rays start; +infinity: not at all
+    const std::size_t levels = cut_->levels.size();
+    float kept[kLanes], loose[kLanes], cut_set[kMostLevels][kLanes]; // where rays start; +infinity: not at all
     for (int i = 0; i < kLanes; ++i) {
-        kept[i] = cut_set[i] = loose[i] = kInfinity;
+        kept[i] = loose[i] = kInfinity;
+        for (std::size_t k = 0; k < levels; ++k) cut_set[k][i] = kInfinity;
         if (!samples.active[i] || !samples.may_open[i]) continue;
         const float x = samples.x[i], y = samples.y[i];
         seen.in_hole[i] = seen.on_target[i] || cut_->distance_at(x, y) <= 0;
         if (!seen.in_hole[i]) continue;
         plain[i] = false;
         depth_per_t[i] = view_->ray(x, y).depth_per_t;
-        const auto start = [&](CutRole role) { return std::max(0.0f, cut_->depth_at(x, y, role)) / depth_per_t[i]; };
+        const auto start = [&](float depth) { return std::max(0.0f, depth) / depth_per_t[i]; };
         kept[i] = 0;
-        loose[i] = start(CutRole::loose);
+        loose[i] = start(cut_->loose_depth_at(x, y));
         // Behind a target the cut set cannot be seen, in front of it nothing is left of it.
-        if (!seen.on_target[i]) cut_set[i] = start(CutRole::cut_set);
+        for (std::size_t k = 0; k < levels && !seen.on_target[i]; ++k)
+            cut_set[k][i] = start(cut_->depth_at(x, y, k).depth);
         // What lies on the target counts as behind it.
         if (seen.on_target[i]) seen.depth[i] = target_depth[i] - std::max(tolerance_, rounding(target_depth[i]));
     }
     // Where the underside of a cut wall lies on the floor it stood on, the floor is seen.
     if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, 0, seen, rays);
     if (has_loose_) trace_role(kMaskLoose, loose, depth_per_t, 0, seen, rays);
-    if (has_cut_set_) trace_role(kMaskCutSet, cut_set, depth_per_t, tolerance_, seen, rays);
+    for (std::size_t k = 0; k < levels && has_cut_set_; ++k)
+        trace_role(level_mask(k), cut_set[k], depth_per_t, tolerance_, seen, rays);
     for (int i = 0; i < kLanes; ++i)
         if (seen.on_target[i]) seen.depth[i] = target_depth[i];
     if (rim_px_ > 0) mark_rim(samples, depth_per_t, seen, rays);

@@ -440,7 +440,7 @@ struct BoxInBox {
         cut.role = role;
         const Rect window{45, 25, 115, 95};
         cut.distance = Image<float>(window);
-        cut.cut_depth = Image<float>(window, 4.6f);
+        cut.levels.emplace_back(window, CutProfile{.floor = 4.6f});
         cut.loose_depth = Image<float>(window, 4.3f);
         for (int y = window.y0; y < window.y1; ++y)
             for (int x = window.x0; x < window.x1; ++x) {

@@ -177,7 +177,11 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
             continue;
         }
         if (query.visit_call) {
-            query.visit_call(query.visit, {c.lane, c.part, c.t});
+            // Both in mesh coordinates: a mirrored placement does not matter.
+            const float facing = RTCHitN_Ng_x(args->hit, args->N, i) * RTCRayN_dir_x(args->ray, args->N, i) +
+                                 RTCHitN_Ng_y(args->hit, args->N, i) * RTCRayN_dir_y(args->ray, args->N, i) +
+                                 RTCHitN_Ng_z(args->hit, args->N, i) * RTCRayN_dir_z(args->ray, args->N, i);
+            query.visit_call(query.visit, {c.lane, c.part, c.t, c.triangle, facing < 0});
             args->valid[i] = 0;
             continue;
         }
@@ -292,7 +296,8 @@ bool Bvh::holds(PartId part) const {
     return porthole::index(part) < state_->held.size() && state_->held[porthole::index(part)];
 }
 
-Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<const CutRole> roles) {
+Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<const CutRole> roles,
+              std::span<const std::uint8_t> levels) {
     const MeshBvhs::State& base = meshes.state();
     const Scene& scene = *base.scene;
     auto state = std::make_unique<Bvh::State>();
@@ -341,7 +346,10 @@ Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<c
         std::uint32_t mask = kMaskAll;
         if (!roles.empty()) {
             const CutRole r = roles[index(order[i])];
-            mask = r == CutRole::fixed ? kMaskFixed : r == CutRole::cut_set ? kMaskCutSet : kMaskLoose;
+            const std::size_t level = levels.empty() ? 0 : levels[index(order[i])];
+            mask = r == CutRole::fixed     ? kMaskFixed
+                   : r == CutRole::cut_set ? kMaskCutSet | level_mask(level)
+                                           : kMaskLoose;
         }
         rtcSetGeometryMask(instance.value, mask);
         rtcCommitGeometry(instance.value);

@@ -91,15 +91,20 @@ private:
 
 /// Ray masks by which a query chooses what it can hit.
 inline constexpr std::uint32_t kMaskFixed = 1, kMaskCutSet = 2, kMaskLoose = 4, kMaskAll = 0xFFFFFFFFu;
+inline constexpr std::size_t kMostLevels = 8;
+/// Parts of the cut set that belong to one level of the cut.
+constexpr std::uint32_t level_mask(std::size_t level) { return 256u << level; }
 
 /// @param parts  the parts it holds, each at most once. Of parts that coincide exactly (same
 ///               mesh data and transform) only one can be hit, a fixed one before others, then
 ///               the first by path: a part duplicated in place changes nothing.
-/// @param roles  by part id: sets each instance's ray mask (kMaskFixed, kMaskCutSet,
-///               kMaskLoose); empty: every mask hits.
+/// @param roles  by part id: sets each instance's ray mask (kMaskFixed, kMaskLoose, or
+///               kMaskCutSet with the bit of its level); empty: every mask hits.
+/// @param levels by part id, below kMostLevels; empty: all 0.
 /// Hits do not depend on the order of `parts` nor on the number of threads.
 /// Cost: about a microsecond per part.
-[[nodiscard]] Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<const CutRole> roles = {});
+[[nodiscard]] Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<const CutRole> roles = {},
+                            std::span<const std::uint8_t> levels = {});
 
 /// Nearest hits of the active lanes. Alpha-masked texels are passed through. After the call
 /// `tfar` is the hit's t and `instance` its part id.
@@ -119,6 +124,8 @@ struct Crossing {
     int lane = 0;
     PartId part = kNoPart;
     float t = 0;
+    std::uint32_t triangle = 0;
+    bool entering = false; ///< the ray runs against the triangle's normal, by its winding
 };
 
 /// Calls visit(Crossing) for every surface that the active lanes cross between tnear and tfar,

@@ -194,7 +194,7 @@ TEST(Trace, CutRemovesForShadowRays) {
     cut.distance = Image<float>(Rect{16, 16, 48, 48}, 1.0f);
     for (int y = 24; y < 40; ++y)
         for (int x = 24; x < 40; ++x) cut.distance(x, y) = -1.0f;
-    cut.cut_depth = Image<float>(cut.distance.window(), 6.0f);
+    cut.levels.emplace_back(cut.distance.window(), CutProfile{.floor = 6.0f});
     cut.loose_depth = Image<float>(cut.distance.window(), -kInfinity);
     cut.role = {CutRole::cut_set};
     const auto is_occluded = [&](Vec3f origin, Vec3f direction, const Cut* c) {
@@ -221,7 +221,7 @@ TEST(Trace, ReflectedRayThatStartsOnARemovedSurfaceGoesOn) {
     Cut cut;
     cut.view = view_from({0, 0, 6}, 64, 64);
     cut.distance = Image<float>(cut.view.window(), -1.0f);
-    cut.cut_depth = Image<float>(cut.view.window(), 7.5f);
+    cut.levels.emplace_back(cut.view.window(), CutProfile{.floor = 7.5f});
     cut.loose_depth = Image<float>(cut.view.window(), -kInfinity);
     cut.role = {CutRole::cut_set, CutRole::fixed};
     auto found = std::async(std::launch::async, [&] {
