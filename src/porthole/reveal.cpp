@@ -41,13 +41,14 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
     // Who is to be seen, who may be cut, from where.
     report_progress("plan", 0);
     const Subject subject = make_subject(meshes, params.targets, kept_parts(scene, params), params.cut_only, control);
-    const FrameSubject framing = frame_subject(scene, params.targets, control);
-    const View view = is_auto(params.camera)
-                          ? view_from_direction(framing,
-                                                best_direction(subject, framing, params.camera, params.width,
-                                                               params.height, params.plan, control),
-                                                params.camera, params.width, params.height)
-                          : make_view(scene, framing, params.camera, params.width, params.height);
+    const auto choose = [&] {
+        const FrameSubject framing = frame_subject(scene, params.targets, control);
+        if (!is_auto(params.camera)) return make_view(scene, framing, params.camera, params.width, params.height);
+        const Vec3f toward_eye =
+            best_direction(subject, framing, params.camera, params.width, params.height, params.plan, control);
+        return view_from_direction(framing, toward_eye, params.camera, params.width, params.height);
+    };
+    const View view = params.view ? *params.view : choose();
 
     Revealed revealed;
     revealed.plan = plan_view(subject, view, params.plan, control);

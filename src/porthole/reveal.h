@@ -1,27 +1,10 @@
 // The whole flow: model in, picture with a hole and its report out.
 #pragma once
 
-#include <functional>
-#include <string>
-#include <vector>
-
-#include "porthole/plan.h"
-#include "porthole/render/render.h"
+#include "porthole/params.h"
 #include "porthole/report.h"
-#include "porthole/scene/camera.h"
 
 namespace porthole {
-
-struct RevealParams {
-    std::vector<PartId> targets;   ///< parts that must be seen
-    std::vector<PartId> keep;      ///< parts that stay whole
-    std::vector<PartId> cut_only;  ///< if not empty, only these may be cut
-    bool keep_see_through = false; ///< blended and transmissive parts stay whole too
-    CameraParams camera;           ///< name "auto": chosen by the plan
-    int width = 1920, height = 1080;
-    PlanParams plan;
-    RenderParams render;
-};
 
 struct Revealed {
     ViewPlan plan;

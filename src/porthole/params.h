@@ -1,0 +1,25 @@
+// What a picture with a hole is asked to be: everything but the model that decides its pixels.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "porthole/plan.h"
+#include "porthole/render/render.h"
+#include "porthole/scene/camera.h"
+
+namespace porthole {
+
+struct RevealParams {
+    std::vector<PartId> targets;   ///< parts that must be seen
+    std::vector<PartId> keep;      ///< parts that stay whole
+    std::vector<PartId> cut_only;  ///< if not empty, only these may be cut
+    bool keep_see_through = false; ///< blended and transmissive parts stay whole too
+    CameraParams camera;           ///< name "auto": chosen by the plan
+    int width = 1920, height = 1080;
+    std::optional<View> view{}; ///< instead of camera, width and height: this very view
+    PlanParams plan;
+    RenderParams render;
+};
+
+} // namespace porthole
