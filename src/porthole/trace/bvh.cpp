@@ -102,6 +102,8 @@ struct Bvh::State {
     SceneHandle top;
     std::vector<PartId> part_of_instance;
     std::vector<std::uint8_t> held; ///< by part id
+    SceneHandle cap_scene;
+    const CapMesh* caps = nullptr;
 };
 
 namespace {
@@ -181,7 +183,7 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
             const float facing = RTCHitN_Ng_x(args->hit, args->N, i) * RTCRayN_dir_x(args->ray, args->N, i) +
                                  RTCHitN_Ng_y(args->hit, args->N, i) * RTCRayN_dir_y(args->ray, args->N, i) +
                                  RTCHitN_Ng_z(args->hit, args->N, i) * RTCRayN_dir_z(args->ray, args->N, i);
-            query.visit_call(query.visit, {c.lane, c.part, c.t, c.triangle, facing < 0});
+            query.visit_call(query.visit, {c.lane, c.part, c.t, c.triangle, c.u, c.v, facing < 0});
             args->valid[i] = 0;
             continue;
         }
@@ -291,6 +293,7 @@ Bvh::Bvh(Bvh&&) noexcept = default;
 Bvh& Bvh::operator=(Bvh&&) noexcept = default;
 Bvh::~Bvh() = default;
 const Scene& Bvh::scene() const { return *state_->meshes->scene; }
+const CapMesh* Bvh::caps() const { return state_->caps; }
 bool Bvh::empty() const { return state_->part_of_instance.empty(); }
 bool Bvh::holds(PartId part) const {
     return porthole::index(part) < state_->held.size() && state_->held[porthole::index(part)];
@@ -343,7 +346,7 @@ Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<c
         const Affine3f a(part.world_from_mesh);
         const float columns[12] = {a.x.x, a.x.y, a.x.z, a.y.x, a.y.y, a.y.z, a.z.x, a.z.y, a.z.z, a.p.x, a.p.y, a.p.z};
         rtcSetGeometryTransform(instance.value, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-        std::uint32_t mask = kMaskAll;
+        std::uint32_t mask = kMaskEverything;
         if (!roles.empty()) {
             const CutRole r = roles[index(order[i])];
             const std::size_t level = levels.empty() ? 0 : levels[index(order[i])];
@@ -358,6 +361,35 @@ Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<c
     rtcCommitScene(state->top.value);
     check_device(device);
     return Bvh(std::move(state));
+}
+
+void add_caps(Bvh& bvh, const CapMesh& caps) {
+    Bvh::State& state = bvh.state();
+    if (caps.empty()) return;
+    const RTCDevice device = state.meshes->device.value;
+    const GeometryHandle geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
+    // Embree reads 16 bytes at the last vertex: a buffer of its own has the room.
+    const std::size_t n = caps.positions.size();
+    if (void* copy =
+            rtcSetNewGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), n))
+        std::memcpy(copy, caps.positions.data(), n * sizeof(Vec3f));
+    rtcSetSharedGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, caps.triangles.data(), 0,
+                               sizeof(Vec3u), caps.triangles.size());
+    rtcCommitGeometry(geometry.value); // without filters: what a cap stops is stopped
+    state.cap_scene = SceneHandle(rtcNewScene(device));
+    rtcSetSceneFlags(state.cap_scene.value, RTC_SCENE_FLAG_ROBUST);
+    rtcAttachGeometryByID(state.cap_scene.value, geometry.value, 0);
+    rtcCommitScene(state.cap_scene.value);
+
+    const GeometryHandle instance(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
+    rtcSetGeometryInstancedScene(instance.value, state.cap_scene.value);
+    rtcSetGeometryMask(instance.value, kMaskCaps);
+    rtcCommitGeometry(instance.value);
+    rtcAttachGeometryByID(state.top.value, instance.value, unsigned(state.part_of_instance.size()));
+    state.part_of_instance.push_back(kCapPart);
+    rtcCommitScene(state.top.value);
+    check_device(device);
+    state.caps = &caps;
 }
 
 void intersect(const Bvh& bvh, RayHit16& rays, Coherence coherence) {
@@ -411,7 +443,7 @@ void intersect_cut(const Bvh& bvh, RayHit16& rays, int lane, const Cut* cut) {
         rtcIntersect1(bvh.state().top.value, &query.rtc, &one);
         if (one.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
         const PartId part = bvh.state().part_of_instance[one.hit.instID[0]];
-        if (!cut || !cut->removes(rays.origin(lane) + rays.direction(lane) * one.ray.tfar, part)) {
+        if (!cut || part == kCapPart || !cut->removes(rays.origin(lane) + rays.direction(lane) * one.ray.tfar, part)) {
             rays.tfar[lane] = one.ray.tfar;
             rays.ng_x[lane] = one.hit.Ng_x, rays.ng_y[lane] = one.hit.Ng_y, rays.ng_z[lane] = one.hit.Ng_z;
             rays.u[lane] = one.hit.u, rays.v[lane] = one.hit.v;

@@ -15,6 +15,17 @@ namespace porthole {
 
 inline constexpr int kLanes = 16; ///< rays of a packet: 4x4 pixels
 
+/// Ray masks by which a query chooses what it can hit. Cap meshes are asked for by name: only
+/// rays that obey the cut see them.
+inline constexpr std::uint32_t kMaskFixed = 1, kMaskCutSet = 2, kMaskLoose = 4, kMaskCaps = 128;
+inline constexpr std::uint32_t kMaskEverything = 0xFFFFFFFFu, kMaskAll = kMaskEverything & ~kMaskCaps;
+inline constexpr std::size_t kMostLevels = 8;
+/// Parts of the cut set that belong to one level of the cut.
+constexpr std::uint32_t level_mask(std::size_t level) { return 256u << level; }
+
+/// What a ray that meets a cap mesh hits; no part of the scene.
+inline constexpr PartId kCapPart{0xFFFFFFFEu};
+
 /// Sixteen rays and their hits, structure of arrays (the layout of RTCRayHit16).
 /// Lanes with tfar < tnear are inactive.
 struct alignas(64) RayHit16 {
@@ -28,7 +39,7 @@ struct alignas(64) RayHit16 {
     std::uint32_t instance[kLanes]; ///< after intersect(): part id, or kNoPart's value
 
     /// Sets lane `i`: ready for intersect() or occluded().
-    void set(int i, Vec3f org, Vec3f dir, float t0, float t1, std::uint32_t ray_mask = 0xFFFFFFFFu) {
+    void set(int i, Vec3f org, Vec3f dir, float t0, float t1, std::uint32_t ray_mask = kMaskAll) {
         org_x[i] = org.x, org_y[i] = org.y, org_z[i] = org.z;
         dir_x[i] = dir.x, dir_y[i] = dir.y, dir_z[i] = dir.z;
         tnear[i] = t0, tfar[i] = t1, time[i] = 0;
@@ -71,6 +82,23 @@ private:
 /// Cost: about 1.5 million triangles a second and thread.
 [[nodiscard]] MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params = {}, const Control& control = {});
 
+/// A point of a part's surface.
+struct SurfaceRef {
+    PartId part = kNoPart;
+    std::uint32_t triangle = 0;
+    float u = 0, v = 0;
+    friend bool operator==(const SurfaceRef&, const SurfaceRef&) = default;
+};
+
+/// The cut surface where it runs through solid material, as triangles in world coordinates:
+/// what shadow, ambient, reflected and refracted rays see of the caps.
+struct CapMesh {
+    std::vector<Vec3f> positions;
+    std::vector<Vec3u> triangles;
+    std::vector<SurfaceRef> face; ///< by triangle: whose material shows
+    [[nodiscard]] bool empty() const { return triangles.empty(); }
+};
+
 /// A top-level hierarchy over instances of some parts. Move-only; const use is thread-safe.
 /// Needs its MeshBvhs alive.
 class Bvh {
@@ -81,19 +109,15 @@ public:
     Bvh& operator=(Bvh&&) noexcept;
     ~Bvh();
     [[nodiscard]] const State& state() const { return *state_; }
+    [[nodiscard]] State& state() { return *state_; }
     [[nodiscard]] const Scene& scene() const;
+    [[nodiscard]] const CapMesh* caps() const;   ///< null without
     [[nodiscard]] bool empty() const;            ///< no parts
     [[nodiscard]] bool holds(PartId part) const; ///< among the parts it was built from
 
 private:
     std::unique_ptr<State> state_;
 };
-
-/// Ray masks by which a query chooses what it can hit.
-inline constexpr std::uint32_t kMaskFixed = 1, kMaskCutSet = 2, kMaskLoose = 4, kMaskAll = 0xFFFFFFFFu;
-inline constexpr std::size_t kMostLevels = 8;
-/// Parts of the cut set that belong to one level of the cut.
-constexpr std::uint32_t level_mask(std::size_t level) { return 256u << level; }
 
 /// @param parts  the parts it holds, each at most once. Of parts that coincide exactly (same
 ///               mesh data and transform) only one can be hit, a fixed one before others, then
@@ -105,6 +129,10 @@ constexpr std::uint32_t level_mask(std::size_t level) { return 256u << level; }
 /// Cost: about a microsecond per part.
 [[nodiscard]] Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<const CutRole> roles = {},
                             std::span<const std::uint8_t> levels = {});
+
+/// Adds the caps to what rays with kMaskCaps hit; such hits are of kCapPart. `caps` must
+/// outlive `bvh` and not change. Cost: as build_mesh_bvhs for its triangles.
+void add_caps(Bvh& bvh, const CapMesh& caps);
 
 /// Nearest hits of the active lanes. Alpha-masked texels are passed through. After the call
 /// `tfar` is the hit's t and `instance` its part id.
@@ -125,6 +153,7 @@ struct Crossing {
     PartId part = kNoPart;
     float t = 0;
     std::uint32_t triangle = 0;
+    float u = 0, v = 0;    ///< on the triangle
     bool entering = false; ///< the ray runs against the triangle's normal, by its winding
 };
 
