@@ -139,6 +139,9 @@ void add_picture(CLI::App& app, PictureOptions& o) {
         ->check(CLI::Range(0, 256));
     app.add_flag_callback(
         "--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
+    add_choice<Lines>(app, "--lines", o.render.lines, {{"none", Lines::none}, {"rim", Lines::rim}, {"all", Lines::all}},
+                      "rim: along the hole's rim and where its cut surfaces end; all: outlines and creases of every "
+                      "part as well (default rim)");
     add_choice<std::string>(app, "--isa", o.isa, {{"avx2", "avx2"}, {"native", "native"}},
                             "avx2: the same pixels on every machine; native: the fastest");
     add_camera(app, o.camera);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "porthole/render/emphasis.h"
+#include "porthole/render/linework.h"
 #include "porthole/render/picture.h"
 
 namespace porthole {
@@ -49,7 +50,9 @@ private:
     double base_ = 0;
 };
 
-void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, const Control& control) {
+/// @param plain  with a cut: the ids of the same view without it.
+void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, const IdBuffer* plain,
+          const Control& control) {
     const Scene& scene = bvh.scene();
     const RenderParams& params = picture.params;
     std::vector<PartId> opened;
@@ -67,15 +70,20 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
     if (params.samples > 1) {
         passes.run(0.02, [&](Rect tile) { find_edges(picture, tile); });
-        passes.run(0.28, [&](Rect tile) { refine_tile(picture, stage, tile); });
+        passes.run(0.23, [&](Rect tile) { refine_tile(picture, stage, tile); });
     }
+    const bool has_rim = cut && params.lines != Lines::none && params.shading != Shading::flat && params.rim_px > 0;
+    if (!has_rim && params.lines != Lines::all) return;
+    const RimLine rim =
+        has_rim ? RimLine(picture, *cut, *plain, float(1e-6 * scene_bounds(scene).diagonal())) : RimLine();
+    passes.run(0.05, [&](Rect tile) { draw_lines(picture, stage, rim, tile); });
 }
 
 Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, const Control& control) {
     const Camera camera(bvh, nullptr, view, nullptr, 0);
     Picture picture(view, params, camera, view.window());
     mark_everything(picture);
-    draw(picture, bvh, nullptr, nullptr, control);
+    draw(picture, bvh, nullptr, nullptr, nullptr, control);
     return {std::move(picture.color), std::move(picture.buffer.ids), picture.rays.get()};
 }
 
@@ -85,10 +93,10 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
     frame.rays = {};
     const Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
     if (window.empty()) return frame;
-    const Camera camera(bvh, targets, view, &cut, params.shading == Shading::flat ? 0.0f : params.rim_px);
+    const Camera camera(bvh, targets, view, &cut, 0.0f);
     Picture picture(view, params, camera, window);
     mark_hole(picture, cut);
-    draw(picture, bvh, targets, &cut, control);
+    draw(picture, bvh, targets, &cut, &under.ids, control);
     // Only pixels with a sample in the hole change; the others stay the plain picture's.
     for (int y = window.y0; y < window.y1; ++y)
         for (int x = window.x0; x < window.x1; ++x) {

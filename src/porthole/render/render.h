@@ -16,6 +16,11 @@ namespace porthole {
 
 enum class Emphasis : std::uint8_t { accent, saturate, none };
 enum class Shading : std::uint8_t { raytraced, flat };
+enum class Lines : std::uint8_t {
+    none,
+    rim, ///< of the hole: its rim, and where its cut surfaces end; none with flat shading
+    all  ///< outlines, steps and creases of all parts as well, outside the hole too
+};
 
 struct RenderParams {
     int samples = 8;    ///< most samples per pixel, [1, 4096], spent where neighbours differ; 1: one at each centre
@@ -24,8 +29,10 @@ struct RenderParams {
     int max_bounces = 6;                  ///< reflections, refractions and blended surfaces along one path, [0, 64]
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
-    float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, [0, 100]; without it, shells of
-                         ///< one colour swallow the hole. Never on a target; none with flat shading
+    Lines lines = Lines::rim;
+    float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, in pixels of a picture up to 1080
+                         ///< high, in higher ones as much wider, [0, 100]; without it, shells of one colour swallow
+                         ///< the hole. Never on a target
     Vec3f background{1, 1, 1}; ///< linear; seen, tinted, through coloured glass
 };
 

@@ -1,0 +1,61 @@
+// Line work: outlines, steps and creases found by rays, to a fraction of a pixel.
+#pragma once
+
+#include <functional>
+
+#include "porthole/base/ids.h"
+#include "porthole/base/view.h"
+#include "porthole/render/primary.h"
+#include "porthole/render/strokes.h"
+
+namespace porthole {
+
+/// What one ray tells about lines.
+struct LineSample {
+    PartId part = kNoPart;
+    bool cap = false; ///< on the cut surface of the part
+    bool in_hole = false;
+    bool on_target = false;
+    bool masked = false; ///< sees what has no lines, nor borders with them
+    float depth = kInfinity;
+    Vec3f position, normal, flat_normal; ///< as in SurfacePoint; unused where nothing is hit
+};
+
+/// Looks at up to sixteen positions; fills the active lanes.
+using LineTrace = std::function<void(const Samples16& samples, LineSample* seen)>;
+
+/// How dark lines are, by what they separate: share of the light taken, [0, 1]; 0: not drawn.
+struct LineRules {
+    float half_width = 0.5f; ///< pixels
+    float outline = 0;       ///< a part and the background
+    float part = 0;          ///< two parts
+    float step = 0;          ///< nearer and farther surfaces of one part
+    float crease = 0;        ///< two faces that meet at an edge
+    float cap = 0;           ///< a cut surface and what is no cut surface of that part
+    /// Whether a line between two samples is wanted, the nearer one first; empty: all are.
+    std::function<bool(const LineSample& nearer, const LineSample& farther)> wanted;
+};
+
+/// The ink of one tile, apart for lines that must not cover targets.
+struct LineInk {
+    Ink open, shy;
+    explicit LineInk(Rect tile) : open(tile), shy(tile) {}
+};
+
+/// Finds the lines of one tile and lays them as ink; those at caps as shy ink.
+///
+/// One ray a pixel tells where something changes; there the rays are twice as dense each way,
+/// and on each link of that lattice which joins different surfaces the place of the change is
+/// bisected to 1/32 px. The crossings of each cell are joined as in marching squares, so a line is
+/// as smooth as what it follows. A change within one part counts as a step if it is still there
+/// at the end of the bisection, and fades in with its size, as creases do with their angle:
+/// no line starts or ends abruptly because of a threshold.
+/// The ink depends on the rays alone, not on the tile: neighbours fit.
+///
+/// @param tile    of the picture.
+/// @param inside  whether a pixel is looked at; asked for pixels up to 4 px off the tile.
+/// Not found: things so thin that no pixel centre near them meets them.
+void find_lines(const View& view, Rect tile, const std::function<bool(int x, int y)>& inside, const LineTrace& trace,
+                const LineRules& rules, LineInk& ink);
+
+} // namespace porthole

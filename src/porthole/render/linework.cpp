@@ -1,0 +1,178 @@
+#include "porthole/render/linework.h"
+
+namespace porthole {
+
+namespace {
+
+constexpr float kRimDark = 0.75f, kInnerDark = 0.5f, kLineDark = 0.3f;
+constexpr float kOutlineDark = 0.55f; ///< against the background
+constexpr float kHalfWidth = 0.5f;    ///< pixels, up to 1080 px of height
+constexpr float kBridged = 0.005f;    ///< half the gaps that the rim's line bridges, of the picture's height
+
+/// 1 within `reach` pixels, along rows and columns, of a 1.
+Mask widened(const Mask& mask, int reach) {
+    const Rect w = mask.window();
+    Mask rows(w), out(w);
+    const auto spread = [reach](auto read, auto write, int begin, int end) {
+        int near = 0; // ones in the window that slides along
+        for (int i = begin; i < std::min(begin + reach, end); ++i) near += read(i);
+        for (int i = begin; i < end; ++i) {
+            if (i + reach < end) near += read(i + reach);
+            write(i, near > 0);
+            if (i - reach >= begin) near -= read(i - reach);
+        }
+    };
+    for (int y = w.y0; y < w.y1; ++y)
+        spread([&](int x) { return int(mask(x, y)); }, [&](int x, bool v) { rows(x, y) = v; }, w.x0, w.x1);
+    for (int x = w.x0; x < w.x1; ++x)
+        spread([&](int y) { return int(rows(x, y)); }, [&](int y, bool v) { out(x, y) = v; }, w.y0, w.y1);
+    return out;
+}
+
+LineRules line_rules(const View& view, bool all, bool caps) {
+    LineRules rules;
+    rules.half_width = line_half_width(view);
+    if (caps) rules.cap = kInnerDark;
+    if (all) {
+        rules.outline = kOutlineDark;
+        rules.part = rules.step = rules.crease = kLineDark;
+    }
+    return rules;
+}
+
+bool may_open(const Picture& picture, const Cut* cut, int x, int y) {
+    if (picture.buffer.pixels.contains(x, y)) return picture.buffer.pixels(x, y).has(Pixel::may_open);
+    if (!cut) return false;
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+            if (cut->distance.at_or(x + dx, y + dy, 1.0f) <= 0) return true;
+    return false;
+}
+
+/// Rays of the picture's own camera.
+LineTrace camera_trace(const Picture& picture, const Stage& stage, RayCounts& rays) {
+    return [&picture, &stage, &rays](const Samples16& asked, LineSample* out) {
+        Samples16 samples = asked;
+        for (int i = 0; i < kLanes; ++i)
+            samples.may_open[i] = samples.active[i] && may_open(picture, stage.cut, int(std::floor(samples.x[i])),
+                                                                int(std::floor(samples.y[i])));
+        const Seen16 seen = picture.camera.trace(samples, rays);
+        for (int i = 0; i < kLanes; ++i) {
+            if (!samples.active[i]) continue;
+            LineSample& s = out[i];
+            s = {};
+            s.in_hole = seen.in_hole[i];
+            s.on_target = seen.on_target[i];
+            const Hit& hit = seen.hit[i];
+            if (!hit.any()) continue;
+            const SurfacePoint point = surface_point(stage.placements[index(hit.part)], hit, seen.direction[i]);
+            s.part = hit.part;
+            s.depth = seen.depth[i];
+            s.position = point.position;
+            s.normal = point.normal;
+            s.flat_normal = point.flat_normal;
+        }
+    };
+}
+
+/// Which sub-positions of a pixel see a target; bit by sub-position.
+std::uint32_t on_target(const LineTrace& trace, int x, int y) {
+    Samples16 samples;
+    for (int i = 0; i < kLanes; ++i) {
+        const Vec2f p = Ink::position(x, y, i);
+        samples.x[i] = p.x, samples.y[i] = p.y;
+        samples.active[i] = true;
+    }
+    std::array<LineSample, kLanes> seen;
+    trace(samples, seen.data());
+    std::uint32_t bits = 0;
+    for (std::uint32_t i = 0; i < kLanes; ++i) bits |= seen[i].on_target ? 1u << i : 0u;
+    return bits;
+}
+
+bool near_target(const GBuffer& buffer, int x, int y) {
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+            if (buffer.pixels.contains(x + dx, y + dy) && buffer.pixels(x + dx, y + dy).has(Pixel::on_target))
+                return true;
+    return false;
+}
+
+} // namespace
+
+float line_scale(const View& view) { return std::max(1.0f, float(view.height) / 1080.0f); }
+float line_half_width(const View& view) { return kHalfWidth * line_scale(view); }
+
+RimLine::RimLine(const Picture& picture, const Cut& cut, const IdBuffer& plain, float tolerance)
+    : cut_(&cut), width_(picture.params.rim_px * line_scale(picture.view)) {
+    const Rect w = picture.buffer.window();
+    const int reach = std::max(2, int(std::lround(kBridged * float(picture.view.height))));
+    Mask removed(w), whole(w);
+    for (int y = w.y0; y < w.y1; ++y)
+        for (int x = w.x0; x < w.x1; ++x) {
+            if (!picture.buffer.pixels(x, y).has(Pixel::in_hole)) continue;
+            const float before = plain.depth(x, y), after = picture.buffer.ids.depth(x, y);
+            (before < after - std::max(tolerance, 1e-6f * before) ? removed : whole)(x, y) = 1;
+        }
+    drawn_ = widened(removed, reach);
+    for (std::size_t i = 0; i < whole.pixels().size(); ++i) whole.pixels()[i] &= std::uint8_t(!drawn_.pixels()[i]);
+    const Mask stays = widened(whole, reach);
+    for (std::size_t i = 0; i < stays.pixels().size(); ++i) drawn_.pixels()[i] &= std::uint8_t(!stays.pixels()[i]);
+}
+
+float RimLine::darkness(float x, float y) const {
+    if (!cut_ || !(width_ > 0)) return 0;
+    const float d = cut_->distance_at(x, y);
+    if (!(d < 1) || !(d > -2 * width_ - 1)) return 0;
+    // Where the distance grows slower or faster than it should, the line keeps its width.
+    constexpr float kStep = 0.5f;
+    const float gx = cut_->distance_at(x + kStep, y) - cut_->distance_at(x - kStep, y);
+    const float gy = cut_->distance_at(x, y + kStep) - cut_->distance_at(x, y - kStep);
+    const float slope = std::clamp(std::sqrt(gx * gx + gy * gy) / (2 * kStep), 0.5f, 1.5f);
+    const float inside = -d / slope;
+    const float covered = part_coverage(inside) * part_coverage(width_ - inside);
+    if (!(covered > 0)) return 0;
+    // How far the line is drawn here, between pixel centres.
+    const float u = x - 0.5f, v = y - 0.5f;
+    const int px = int(std::floor(u)), py = int(std::floor(v));
+    const float fx = u - float(px), fy = v - float(py);
+    const auto at = [&](int i, int j) { return float(drawn_.at_or(i, j, 0)); };
+    const float drawn = (at(px, py) * (1 - fx) + at(px + 1, py) * fx) * (1 - fy) +
+                        (at(px, py + 1) * (1 - fx) + at(px + 1, py + 1) * fx) * fy;
+    return kRimDark * covered * drawn;
+}
+
+void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect tile) {
+    const bool all = picture.params.lines == Lines::all;
+    const bool caps = stage.cut && picture.params.shading != Shading::flat && picture.params.rim_px > 0;
+    RayCounts rays;
+    const LineTrace trace = camera_trace(picture, stage, rays);
+    const auto inside = [&](int x, int y) {
+        const bool known = picture.buffer.pixels.contains(x, y);
+        return known ? picture.buffer.pixels(x, y).has(Pixel::traced)
+                     : !stage.cut || may_open(picture, stage.cut, x, y);
+    };
+    LineInk ink(tile);
+    if (all || caps) find_lines(picture.view, tile, inside, trace, line_rules(picture.view, all, caps), ink);
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x) {
+            if (!picture.buffer.pixels(x, y).has(Pixel::traced) || (stage.cut && !picture.opened(x, y))) continue;
+            float open = 0, shy = 0;
+            std::array<float, Ink::kParts> hidden;
+            for (int i = 0; i < Ink::kParts; ++i) {
+                const Vec2f p = Ink::position(x, y, i);
+                hidden[std::size_t(i)] = std::max(ink.shy.part(x, y, i), rim.darkness(p.x, p.y));
+                shy = std::max(shy, hidden[std::size_t(i)]);
+                open = std::max(open, ink.open.part(x, y, i));
+            }
+            if (shy == 0 && open == 0) continue;
+            const std::uint32_t targets = shy > 0 && near_target(picture.buffer, x, y) ? on_target(trace, x, y) : 0;
+            float sum = 0;
+            for (int i = 0; i < Ink::kParts; ++i)
+                sum += std::max(ink.open.part(x, y, i), (targets >> i & 1u) ? 0.0f : hidden[std::size_t(i)]);
+            picture.color(x, y) = inked(picture.color(x, y), sum / float(Ink::kParts));
+        }
+    picture.rays.add(rays);
+}
+
+} // namespace porthole

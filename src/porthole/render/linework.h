@@ -1,0 +1,39 @@
+// The lines of one picture: the rim of its hole, and outlines and creases.
+#pragma once
+
+#include "porthole/render/lines.h"
+#include "porthole/render/picture.h"
+
+namespace porthole {
+
+/// Half the width of outlines and creases; scaled like rim_px in pictures over 1080 px high.
+[[nodiscard]] float line_half_width(const View& view);
+/// How much wider than stated lines are in pictures over 1080 px high.
+[[nodiscard]] float line_scale(const View& view);
+
+/// Where along the rim of a hole its line is drawn: where something was cut away.
+///
+/// On bumpy surfaces the cut begins ragged: here the surface lies in front of it, there behind.
+/// The line bridges gaps of up to a hundredth of the picture's height, so that it is even, and
+/// does not run on where the rim crosses what is whole.
+class RimLine {
+public:
+    RimLine() = default; ///< none
+    /// @param picture  after the first pass.
+    /// @param plain    the ids of the same view without the cut.
+    RimLine(const Picture& picture, const Cut& cut, const IdBuffer& plain, float tolerance);
+
+    /// How much the line takes of the light at a position of the picture, [0, 1].
+    [[nodiscard]] float darkness(float x, float y) const;
+
+private:
+    const Cut* cut_ = nullptr;
+    float width_ = 0;
+    Image<std::uint8_t> drawn_;
+};
+
+/// Pass 5: draws the lines that the picture's parameters ask for over one tile. In a picture
+/// with a cut only on pixels that it opens, and those of the rim never on targets.
+void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect tile);
+
+} // namespace porthole
