@@ -346,7 +346,9 @@ bool is_auto(const CameraParams& params) {
 FrameSubject frame_subject(const Scene& scene, std::span<const PartId> targets, const Control& control) {
     std::vector<std::vector<Vec3f>> hulls(scene.meshes.size());
     parallel_for(scene.meshes.size(), control, [&](std::size_t m) {
-        const std::vector<Vec3f>& positions = scene.meshes[m].positions;
+        const Mesh& mesh = scene.meshes[m];
+        const std::vector<Vec3f> hull = hull_points(mesh.primitives);
+        const std::vector<Vec3f>& positions = mesh.primitives.empty() ? mesh.positions : hull;
         hulls[m] = positions.size() <= kDirections ? positions : extremes(positions);
     });
     const auto placed_hulls = [&](auto&& each_part) {

@@ -15,6 +15,7 @@ std::uint32_t Mesh::material_of(std::uint32_t triangle) const {
 Bounds3d part_bounds(const Scene& scene, PartId id) {
     const Part& part = scene.parts[index(id)];
     const Mesh& mesh = scene.meshes[part.mesh];
+    if (!mesh.primitives.empty()) return bounds(mesh.primitives, part.world_from_mesh);
     Bounds3d bounds;
     for (const Vec3f& p : mesh.positions) bounds.extend(part.world_from_mesh.point(Vec3d(p)));
     return bounds;
@@ -53,10 +54,33 @@ bool has_area(Vec3f a, Vec3f b, Vec3f c) {
     return dot(n, n) > 0;
 }
 
+void finish_primitives(Mesh& mesh) {
+    mesh.submeshes.clear();
+    for (const PrimitiveLeaf& leaf : mesh.primitives.leaves) {
+        const std::uint32_t surfaces = surface_count(leaf.kind);
+        if (!mesh.submeshes.empty() && mesh.submeshes.back().material == leaf.material)
+            mesh.submeshes.back().triangle_count += surfaces;
+        else
+            mesh.submeshes.push_back({leaf.first_surface, surfaces, leaf.material});
+    }
+    mesh.bounds = {};
+    const Bounds3d box = mesh.primitives.bounds();
+    if (box.empty()) return;
+    // Rounded outward.
+    for (int axis = 0; axis < 3; ++axis) {
+        mesh.bounds.lower[axis] = std::nextafter(float(box.lower[axis]), -kInfinity);
+        mesh.bounds.upper[axis] = std::nextafter(float(box.upper[axis]), kInfinity);
+    }
+}
+
 } // namespace
 
 MeshRepair finish_mesh(Mesh& mesh) {
     MeshRepair repair;
+    if (!mesh.primitives.empty()) {
+        finish_primitives(mesh);
+        return repair;
+    }
     const std::size_t vertices = mesh.positions.size();
     const auto corners_usable = [&](Vec3u t) {
         return t.x < vertices && t.y < vertices && t.z < vertices && usable(mesh.positions[t.x]) &&

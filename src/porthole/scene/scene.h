@@ -10,6 +10,7 @@
 #include "porthole/base/error.h"
 #include "porthole/base/ids.h"
 #include "porthole/base/math.h"
+#include "porthole/scene/primitive.h"
 
 namespace porthole {
 
@@ -59,16 +60,19 @@ struct Material {
     float attenuation_distance = kInfinity; ///< metres
 };
 
-/// A run of triangles with one material.
+/// A run of triangles, or of primitives' surfaces, with one material.
 struct Submesh {
     std::uint32_t first_triangle = 0, triangle_count = 0;
     std::uint32_t material = 0; ///< index into Scene::materials
 };
 
 /// Triangles counter-clockwise in front, in the mesh's own coordinates. Attribute arrays
-/// are empty or as long as `positions`.
+/// are empty or as long as `positions`. A mesh of primitives has no triangles and no
+/// attributes: their surfaces take the place of triangles wherever they are numbered, and a hit's
+/// u and v are surface_coordinates().
 struct Mesh {
     std::string name;
+    PrimitiveTree primitives;     ///< empty: triangles
     std::vector<Vec3f> positions; ///< finite; with capacity for one more, Embree shares them, else it copies
     std::vector<Vec3u> triangles; ///< indices below positions.size()
     std::vector<Vec3f> normals;   ///< unit length; empty: shaded flat
@@ -79,6 +83,7 @@ struct Mesh {
     Bounds3f bounds;
 
     [[nodiscard]] std::uint32_t material_of(std::uint32_t triangle) const;
+    [[nodiscard]] bool empty() const { return triangles.empty() && primitives.empty(); } ///< nothing to be hit
 };
 
 struct Part {
@@ -124,17 +129,19 @@ struct Scene {
     [[nodiscard]] const Mesh& mesh_of(PartId part) const { return meshes[parts[index(part)].mesh]; }
 };
 
-/// World-space box of a part (exact over its vertices) and of all parts.
+/// World-space box of a part (exact over its vertices; of primitives as bounds() says) and of all parts.
 [[nodiscard]] Bounds3d part_bounds(const Scene& scene, PartId part);
 [[nodiscard]] Bounds3d scene_bounds(const Scene& scene);
 
 /// All part ids, 0..n-1.
 [[nodiscard]] std::vector<PartId> all_parts(const Scene& scene);
-[[nodiscard]] std::uint64_t triangle_count(const Scene& scene); ///< over parts: a shared mesh counts each time
+[[nodiscard]] std::uint64_t triangle_count(
+    const Scene& scene); ///< over parts: a shared mesh counts each time; primitives have none
 
 /// Puts a freshly read mesh in order: drops triangles with a non-finite, out-of-range or
 /// repeated corner, and all triangles when none has any area, computes bounds, reserves Embree's padding, fixes the
 /// submeshes. Every reader calls it.
+/// Of primitives it makes the submeshes and the bounds.
 /// @return how many triangles were dropped for (a) non-finite vertices, (b) no area.
 struct MeshRepair {
     std::uint64_t non_finite = 0, degenerate = 0;

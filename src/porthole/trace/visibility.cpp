@@ -62,6 +62,7 @@ std::uint32_t spread(std::uint32_t v) {
 }
 
 std::vector<Bounds3f> boxes_of(const Mesh& mesh) {
+    if (!mesh.primitives.empty()) return {mesh.bounds};
     constexpr std::size_t kCluster = 64;
     const std::size_t n = mesh.triangles.size();
     std::vector<std::pair<std::uint32_t, std::uint32_t>> order(n);

@@ -23,7 +23,7 @@ struct ClusterBoxes {
 };
 
 /// Boxes for the meshes of `parts`; other meshes get none. Triangles are grouped along a
-/// Morton curve of their centroids. Cost: a sort of the parts' triangles.
+/// Morton curve of their centroids; a mesh of primitives has one box. Cost: a sort of the parts' triangles.
 [[nodiscard]] ClusterBoxes cluster_boxes(const Scene& scene, std::span<const PartId> parts,
                                          const Control& control = {});
 
