@@ -36,6 +36,22 @@ Vec3f bulge(const Vec3f (&corner)[3], const Vec3f (&normal)[3], const float (&we
     return lift;
 }
 
+// On a surface given by a formula: the true normal everywhere, so there is nothing to smooth.
+SurfacePoint primitive_point(const Placement& placement, const Hit& hit, Vec3f direction) {
+    const PrimitivePoint p = surface_point(placement.mesh->primitives, hit.triangle, Vec2f{hit.u, hit.v});
+    const Vec3f n(p.normal);
+    SurfacePoint s;
+    s.position = placement.world_from_mesh.point(Vec3f(p.position));
+    Vec3f flat = normalize(placement.nx * n.x + placement.ny * n.y + placement.nz * n.z, -direction);
+    s.front = dot(flat, direction) <= 0;
+    if (!s.front) flat = -flat;
+    s.flat_normal = flat;
+    s.normal = bent_to_viewer(flat, -direction, 0.02f);
+    s.start = s.position + flat * placement.offset;
+    s.beyond = s.position - flat * placement.offset;
+    return s;
+}
+
 } // namespace
 
 Vec3f saturated(Vec3f color, float factor) {
@@ -77,6 +93,7 @@ std::vector<Placement> make_placements(const Scene& scene) {
 
 SurfacePoint surface_point(const Placement& placement, const Hit& hit, Vec3f direction) {
     const Mesh& mesh = *placement.mesh;
+    if (!mesh.primitives.empty()) return primitive_point(placement, hit, direction);
     const Vec3u t = mesh.triangles[hit.triangle];
     const float weight[3] = {1.0f - hit.u - hit.v, hit.u, hit.v};
     const Vec3f corner[3] = {mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]};

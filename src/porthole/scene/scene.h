@@ -83,7 +83,8 @@ struct Mesh {
     Bounds3f bounds;
 
     [[nodiscard]] std::uint32_t material_of(std::uint32_t triangle) const;
-    [[nodiscard]] bool empty() const { return triangles.empty() && primitives.empty(); } ///< nothing to be hit
+    /// Nothing to be hit.
+    [[nodiscard]] bool empty() const { return triangles.empty() && primitives.bounds().empty(); }
 };
 
 struct Part {

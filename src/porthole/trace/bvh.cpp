@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstring>
 #include <numeric>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "porthole/scene/texture.h"
+#include "porthole/trace/primitive_geometry.h"
 
 namespace porthole {
 
@@ -58,7 +60,13 @@ std::uint64_t hash_bytes(std::uint64_t h, const void* data, std::size_t n) {
 
 /// Geometry alone: two meshes with the same shape are the same here.
 std::uint64_t shape_hash(const Mesh& mesh) {
-    const std::uint64_t h = hash_bytes(1, mesh.positions.data(), mesh.positions.size() * sizeof(Vec3f));
+    std::uint64_t h = hash_bytes(1, mesh.positions.data(), mesh.positions.size() * sizeof(Vec3f));
+    for (const PrimitiveNode& node : mesh.primitives.nodes)
+        h = mixed(h, std::uint64_t(node.operation) << 32 | node.end);
+    for (const PrimitiveLeaf& leaf : mesh.primitives.leaves) {
+        h = mixed(mixed(h, std::uint64_t(leaf.kind)), std::bit_cast<std::uint64_t>(leaf.ratio));
+        h = hash_bytes(h, &leaf.mesh_from_leaf, sizeof leaf.mesh_from_leaf);
+    }
     return hash_bytes(h, mesh.triangles.data(), mesh.triangles.size() * sizeof(Vec3u));
 }
 
@@ -94,6 +102,7 @@ struct MeshBvhs::State {
     DeviceHandle device;
     std::vector<SceneHandle> meshes;
     std::vector<SurfaceKind> kinds;
+    std::vector<PrimitiveGeometry> primitives; ///< by mesh
     std::vector<std::uint64_t> hashes;
 };
 
@@ -241,13 +250,34 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
     }
     state->meshes.resize(scene.meshes.size());
     state->kinds.resize(scene.meshes.size());
+    state->primitives.resize(scene.meshes.size());
     state->hashes.resize(scene.meshes.size());
 
+    const auto scene_of = [&](RTCGeometry geometry) {
+        const RTCDevice device = state->device.value;
+        rtcCommitGeometry(geometry);
+        SceneHandle built(rtcNewScene(device));
+        rtcSetSceneFlags(built.value, RTC_SCENE_FLAG_ROBUST);
+        rtcAttachGeometryByID(built.value, geometry, 0);
+        rtcCommitScene(built.value);
+        check_device(device);
+        return built;
+    };
     const auto build = [&](std::size_t i) {
         const Mesh& mesh = scene.meshes[i];
         const RTCDevice device = state->device.value;
         state->kinds[i] = surface_kind(scene, mesh);
         state->hashes[i] = shape_hash(mesh);
+
+        void* const kind = reinterpret_cast<void*>(std::uintptr_t(state->kinds[i]));
+        const RTCFilterFunctionN nearest_filter = state->kinds[i] != SurfaceKind::opaque ? pass_texel_holes : nullptr;
+        if (mesh.triangles.empty() && !mesh.empty()) {
+            const GeometryHandle geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER));
+            state->primitives[i] = {&mesh, kind, nearest_filter, occlusion_filter};
+            set_primitives(geometry.value, state->primitives[i]);
+            state->meshes[i] = scene_of(geometry.value);
+            return;
+        }
 
         const GeometryHandle geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
         // Embree reads 16 bytes at the last vertex. A copied Scene has lost the room for that.
@@ -260,18 +290,10 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
         }
         rtcSetSharedGeometryBuffer(geometry.value, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                                    sizeof(Vec3u), mesh.triangles.size());
-        rtcSetGeometryUserData(geometry.value, reinterpret_cast<void*>(std::uintptr_t(state->kinds[i])));
+        rtcSetGeometryUserData(geometry.value, kind);
         rtcSetGeometryOccludedFilterFunction(geometry.value, occlusion_filter);
-        if (state->kinds[i] != SurfaceKind::opaque)
-            rtcSetGeometryIntersectFilterFunction(geometry.value, pass_texel_holes);
-        rtcCommitGeometry(geometry.value);
-
-        SceneHandle built(rtcNewScene(device));
-        rtcSetSceneFlags(built.value, RTC_SCENE_FLAG_ROBUST);
-        rtcAttachGeometryByID(built.value, geometry.value, 0);
-        rtcCommitScene(built.value);
-        check_device(device);
-        state->meshes[i] = std::move(built);
+        rtcSetGeometryIntersectFilterFunction(geometry.value, nearest_filter);
+        state->meshes[i] = scene_of(geometry.value);
     };
 
     // Large meshes one after the other, Embree's threads inside each; small ones side by side.
@@ -321,7 +343,7 @@ Bvh build_bvh(const MeshBvhs& meshes, std::span<const PartId> parts, std::span<c
     std::vector<PartId> order;
     for (const PartId id : parts) {
         state->held[index(id)] = 1;
-        if (!scene.mesh_of(id).triangles.empty()) order.push_back(id);
+        if (!scene.mesh_of(id).empty()) order.push_back(id);
     }
     std::sort(order.begin(), order.end(), [&](PartId a, PartId b) {
         if (hash(a) != hash(b)) return hash(a) < hash(b);
