@@ -318,6 +318,7 @@ Pieces find_pieces(const Mesh& mesh) {
 }
 
 Closedness closedness(const Mesh& mesh) {
+    if (!mesh.primitives.empty()) return {.closed = true};
     DisjointSets ignored(mesh.triangles.size());
     return pair_edges(mesh, ignored).counts;
 }

@@ -1,6 +1,7 @@
 #include "porthole/scene/primitive.h"
 
 #include <algorithm>
+#include <random>
 
 namespace porthole {
 
@@ -286,6 +287,30 @@ PrimitivePoint surface_point(const PrimitiveTree& tree, std::uint32_t surface, V
     }
     }
     return {leaf.mesh_from_leaf.point(p), mesh_normal(leaf, n)};
+}
+
+std::vector<Vec3d> surface_samples(const PrimitiveTree& tree, int count) {
+    std::vector<Vec3d> out;
+    const Bounds3d box = tree.bounds();
+    if (box.empty()) return out;
+    // Lines that are spread evenly over all lines through a ball meet every surface in it evenly.
+    std::mt19937_64 random(1);
+    const auto signed_unit = [&] { return 2 * (double(random() >> 11) * 0x1p-53) - 1; };
+    const auto in_ball = [&](double flat) {
+        for (;;)
+            if (const Vec3d v{signed_unit(), signed_unit(), flat * signed_unit()}; dot(v, v) < 1) return v;
+    };
+    std::vector<PrimitiveCrossing> crossings;
+    for (int line = 0; line < 32 * count && int(out.size()) < count; ++line) {
+        const Vec3d direction = normalize(in_ball(1));
+        const Vec3d side = normalize(cross(direction, std::abs(direction.x) < 0.7 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0}));
+        const Vec3d disc = in_ball(0);
+        const Vec3d origin = box.center() + (side * disc.x + cross(direction, side) * disc.y) * (0.5 * box.diagonal());
+        find_crossings(tree, origin, direction, crossings);
+        for (const PrimitiveCrossing& c : crossings)
+            if (int(out.size()) < count) out.push_back(origin + direction * c.t);
+    }
+    return out;
 }
 
 } // namespace porthole

@@ -117,4 +117,9 @@ struct PrimitivePoint {
 /// primitive's size, and on the surface to double precision.
 [[nodiscard]] PrimitivePoint surface_point(const PrimitiveTree& tree, std::uint32_t surface, Vec2f coordinates);
 
+/// Up to `count` points spread at random and evenly over the surface of a solid, mesh
+/// coordinates; fewer, or none, where it is too thin to be found. The same every time.
+/// Cost: that of up to 32 lines a point.
+[[nodiscard]] std::vector<Vec3d> surface_samples(const PrimitiveTree& tree, int count);
+
 } // namespace porthole

@@ -277,6 +277,21 @@ TEST(Primitive, PointsComeBackFromTheirCoordinates) {
     EXPECT_GT(checked, 3000);
 }
 
+TEST(Primitive, SamplesAreSpreadOverTheSurface) {
+    const PrimitiveTree box = make_primitive(PrimitiveKind::box, 0, {{1, 0, 0}, {0, 2, 0}, {0, 0, 3}, {5, 0, 0}});
+    const std::vector<Vec3d> points = surface_samples(box, 6000);
+    ASSERT_EQ(points.size(), 6000u);
+    int on_x = 0, right = 0;
+    for (const Vec3d& p : points) {
+        const Vec3d q{std::abs(p.x - 5), std::abs(p.y) / 2, std::abs(p.z) / 3};
+        EXPECT_NEAR(std::max({q.x, q.y, q.z}), 1, 1e-12);
+        on_x += q.x > 1 - 1e-9, right += p.x > 5;
+    }
+    EXPECT_NEAR(on_x / 6000.0, 6 / 11.0, 0.03) << "by area";
+    EXPECT_NEAR(right / 6000.0, 0.5, 0.03);
+    EXPECT_TRUE(surface_samples({}, 10).empty());
+}
+
 TEST(Primitive, FacesInOnePlaneLeaveNoFilm) {
     // A drilled plate: the drill is exactly as long as the plate is thick. Then the same, turned.
     const auto box = [](Vec3d half) {

@@ -302,6 +302,14 @@ void judge_open_pieces(const Mesh& mesh, const Pieces& pieces, const std::vector
 } // namespace
 
 MeshSolid find_solid(const Mesh& mesh) {
+    // Primitives bound material by what they are.
+    if (!mesh.primitives.empty())
+        return {.closed = true,
+                .by = ClosedBy::edges,
+                .uniform = TriangleSide::outward,
+                .components = 1,
+                .closed_components = 1,
+                .edges = {.closed = true}};
     const Pieces pieces = find_pieces(mesh);
     const std::size_t count = pieces.kind.size();
     const std::vector<Measures> measures = measure(mesh, pieces);

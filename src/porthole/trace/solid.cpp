@@ -116,9 +116,10 @@ std::vector<Vec3f> surface_points(const Scene& scene, PartId id, int count) {
     const auto area = [&](const Vec3u& t) {
         return length(cross(corner(t.y) - corner(t.x), corner(t.z) - corner(t.x)));
     };
+    std::vector<Vec3f> out;
+    for (const Vec3d& p : surface_samples(mesh.primitives, count)) out.push_back(Vec3f(part.world_from_mesh.point(p)));
     double all = 0;
     for (const Vec3u& t : mesh.triangles) all += area(t);
-    std::vector<Vec3f> out;
     double below = 0;
     for (const Vec3u& t : mesh.triangles) {
         below += area(t);
