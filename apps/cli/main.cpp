@@ -51,22 +51,23 @@ template <typename Enum> CLI::Option* add_choice(CLI::App& app, const std::strin
 }
 
 void add_model(CLI::App& app, CommonOptions& o) {
-    app.add_option("MODEL", o.model, "The model: glTF, GLB, OBJ, PLY or STL; - reads standard input")
+    app.add_option("MODEL", o.model,
+                   "The model: glTF, GLB, OBJ, PLY, STL or a scene of primitives; - reads standard input")
         ->type_name("FILE")
         ->required();
 }
 
 void add_common(CLI::App& app, CommonOptions& o) {
     app.option_defaults()->group("Reading");
-    add_read(app, "--format", "Format of the model, whatever its name", "glb|gltf|obj|ply|stl",
+    add_read(app, "--format", "Format of the model, whatever its name", "glb|gltf|obj|ply|scene|stl",
              [&o](const std::string& text, const std::string& option) {
-                 for (const char* known : {"glb", "gltf", "obj", "ply", "stl"})
+                 for (const char* known : {"glb", "gltf", "obj", "ply", "scene", "stl"})
                      if (text == known) {
                          o.load.format = text;
                          return;
                      }
                  throw Error(ErrorKind::usage, "E0105", option,
-                             "\"" + text.substr(0, 80) + "\" is not one of glb, gltf, obj, ply, stl");
+                             "\"" + text.substr(0, 80) + "\" is not one of glb, gltf, obj, ply, scene, stl");
              });
     add_read(app, "--up", "Axis of the file that points up (default y)", "y|z",
              [&o](const std::string& text, const std::string& option) { o.load.up = parse_up(text, option); });

@@ -105,7 +105,9 @@ std::string table(const Scene& scene, const Facts& facts) {
         for (std::size_t k = common; k < above.size(); ++k)
             row("", "", "", "", "", std::string(2 * std::min<std::size_t>(k, 40), ' ') + escaped(above[k]) + '/');
         const Mesh& mesh = scene.meshes[part.mesh];
-        row('#' + std::to_string(i), with_commas(std::int64_t(mesh.triangles.size())),
+        // Primitives have no triangles: they are what their formulas say.
+        row('#' + std::to_string(i),
+            mesh.primitives.empty() ? with_commas(std::int64_t(mesh.triangles.size())) : "exact",
             facts.closed[part.mesh].closed ? "closed" : "open", in_unit(facts.boxes[i].size(), unit),
             joined(materials_of(scene, part), 20),
             std::string(2 * std::min<std::size_t>(above.size(), 40), ' ') + escaped(path.back()));

@@ -23,7 +23,7 @@ enum class ErrorKind {
 /// option name; what() is the reason with a hint. None of the three is escaped: names in
 /// them may be hostile, and whoever prints them escapes.
 /// Codes: E01xx usage, E02xx files and system, E03xx glTF, E04xx OBJ/MTL, E05xx PLY,
-/// E06xx STL, E07xx images, E08xx output, E09xx limits; Wxxxx alike.
+/// E06xx STL, E07xx images, E08xx output, E09xx limits, E10xx scene files; Wxxxx alike.
 class Error : public std::runtime_error {
 public:
     Error(ErrorKind error_kind, std::string error_code, std::string place, const std::string& reason)

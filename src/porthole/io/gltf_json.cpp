@@ -59,7 +59,7 @@ private:
     bool open(Json::value_t kind) {
         if (open_.size() == kMaxDepth)
             throw Error(ErrorKind::input, "E0302", file_,
-                        "JSON values nest deeper than " + std::to_string(kMaxDepth) + "; no glTF file needs that");
+                        "JSON values nest deeper than " + std::to_string(kMaxDepth) + "; no model needs that");
         open_.push_back(add(kind));
         return true;
     }

@@ -12,14 +12,15 @@
 #include "porthole/io/gltf.h"
 #include "porthole/io/obj.h"
 #include "porthole/io/ply.h"
+#include "porthole/io/scene_json.h"
 #include "porthole/io/stl.h"
 
 namespace porthole {
 namespace {
 
-enum class Format : std::uint8_t { gltf, obj, ply, stl };
+enum class Format : std::uint8_t { gltf, obj, ply, scene, stl };
 
-constexpr const char* kReadable = "glTF, GLB, OBJ, PLY and STL are read";
+constexpr const char* kReadable = "glTF, GLB, OBJ, PLY, STL and scenes of primitives are read";
 
 std::string lower(std::string_view text) {
     std::string out(text);
@@ -32,6 +33,7 @@ std::optional<Format> format_named(std::string_view name) {
     if (s == "glb" || s == "gltf" || s == "vrm") return Format::gltf;
     if (s == "obj") return Format::obj;
     if (s == "ply") return Format::ply;
+    if (s == "scene" || s == "json") return Format::scene;
     if (s == "stl") return Format::stl;
     return std::nullopt;
 }
@@ -41,6 +43,7 @@ const char* title(Format format) {
     case Format::gltf: return "glTF";
     case Format::obj: return "OBJ";
     case Format::ply: return "PLY";
+    case Format::scene: return "scene";
     case Format::stl: break;
     }
     return "STL";
@@ -157,7 +160,7 @@ std::optional<Format> format_of(const FileBytes& file) {
     // Before the marks of other files: the 80 bytes of its header may say anything.
     if (is_exact_binary_stl(file) && bytes.size() > 84) return Format::stl;
     const std::string_view start = opening(bytes);
-    if (start.starts_with('{')) return Format::gltf;
+    if (start.starts_with('{')) return has_scene_mark(start) ? Format::scene : Format::gltf;
     const std::string begin = lower(start);
     if (begin.starts_with("solid") &&
         (begin.find("facet") != std::string::npos || begin.find("endsolid") != std::string::npos))
@@ -173,12 +176,16 @@ Format choose_format(const FileBytes& file, const std::string& path, const LoadP
         const std::optional<Format> asked = format_named(params.format);
         if (!asked)
             throw Error(ErrorKind::usage, "E0120", "--format",
-                        "'" + escaped(params.format, 60) + "' is not glb, gltf, obj, ply or stl");
+                        "'" + escaped(params.format, 60) + "' is not glb, gltf, obj, ply, scene or stl");
         return *asked;
     }
     const std::string ending = std::filesystem::path(path).extension().string();
     const std::optional<Format> named = format_named(ending.empty() ? "" : std::string_view(ending).substr(1));
-    if (const std::optional<Format> found = format_of(file)) {
+    std::optional<Format> found = format_of(file);
+    // JSON without a mark: its name tells which reader explains what is missing.
+    if (found == Format::gltf && named == Format::scene && file.text().find("\"asset\"") == std::string_view::npos)
+        found = named;
+    if (found) {
         if (named && *named != *found)
             warnings.push_back({"W0201", path,
                                 std::string("named as ") + title(*named) + ", but the content is " + title(*found) +
@@ -198,6 +205,7 @@ Scene read_as(Format format, const FileBytes& file, const std::filesystem::path&
     case Format::gltf: return read_gltf(file, path, params, control);
     case Format::obj: return read_obj(file, path, params, control);
     case Format::ply: return read_ply(file, path, params, control);
+    case Format::scene: return read_scene_json(file, path, params, control);
     case Format::stl: break;
     }
     return read_stl(file, path, params, control);
@@ -232,7 +240,7 @@ void convert_units(Scene& scene, const LoadParams& params) {
 /// Parts of which no triangle was usable say nothing and would stretch the scene's box. If
 /// there are no others they stay: the file is a model, if one that shows nothing.
 void drop_empty_parts(Scene& scene) {
-    const auto is_empty = [&](const Part& part) { return scene.meshes[part.mesh].triangles.empty(); };
+    const auto is_empty = [&](const Part& part) { return scene.meshes[part.mesh].empty(); };
     if (std::all_of(scene.parts.begin(), scene.parts.end(), is_empty)) return;
     std::erase_if(scene.parts, is_empty);
 }

@@ -11,7 +11,7 @@
 namespace porthole {
 
 struct LoadParams {
-    std::string format;         ///< "glb", "gltf", "obj", "ply", "stl"; empty: told from content and name
+    std::string format;         ///< "glb", "gltf", "obj", "ply", "scene", "stl"; empty: told from content and name
     double time = -1;           ///< seconds into the first animation; negative: rest pose
     char up = 'y';              ///< axis of the file that points up, 'y' or 'z' (z-up is rotated to y)
     double metres_per_unit = 1; ///< length of the file's unit
@@ -29,7 +29,7 @@ struct LoadParams {
 /// A file whose name promises another format than its content has is read as what it is, with
 /// warning W0201. Parts of which no triangle is usable are left out, unless all are such.
 ///
-/// @throws Error input (E02xx..E07xx) with file and position, E0204 naming what the file is
+/// @throws Error input (E02xx..E07xx, E10xx) with file and position, E0204 naming what the file is
 ///         instead of a model that is read; usage E0120..E0122 for params out of range; limit
 ///         (E09xx) when params.max_bytes would be passed; Cancelled.
 /// Cost: linear in the file; decoding and textures run on control.threads threads.
