@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "output.h"
+#include "porthole/base/sha256.h"
 #include "porthole/base/tone.h"
 #include "porthole/io/files.h"
 #include "porthole/io/image_file.h"
@@ -44,6 +45,8 @@ void check_writable(const std::string& path, bool no_clobber) {
 
 } // namespace
 
+bool asks_for_report(const PictureOptions& options) { return options.json || !options.report_path.empty(); }
+
 void check_outputs(const PictureOptions& options, std::uint64_t max_memory) {
     const auto usage = [](const char* code, const std::string& where, const std::string& reason) {
         return Error(ErrorKind::usage, code, where, reason);
@@ -73,18 +76,26 @@ void check_outputs(const PictureOptions& options, std::uint64_t max_memory) {
     check_writable(options.report_path, options.no_clobber);
 }
 
-void write_picture(const Frame& frame, const PictureOptions& options) {
+std::vector<std::byte> encode_picture(const Frame& frame, const PictureOptions& options) {
     const bool alpha = options.no_background;
     const Vec3f background = options.render.background;
-    std::vector<std::byte> bytes;
-    if (is_jpeg(options.output))
-        bytes = encode_jpeg(to_srgb8(frame.color, background, false));
-    else if (options.bits == 16)
-        bytes = encode_png16(to_srgb16(frame.color, background, alpha), frame.color.width(), frame.color.height(),
-                             alpha ? 4 : 3);
-    else
-        bytes = encode_png(to_srgb8(frame.color, background, alpha), alpha ? 4 : 3);
+    if (is_jpeg(options.output)) return encode_jpeg(to_srgb8(frame.color, background, false));
+    if (options.bits == 16)
+        return encode_png16(to_srgb16(frame.color, background, alpha), frame.color.width(), frame.color.height(),
+                            alpha ? 4 : 3);
+    return encode_png(to_srgb8(frame.color, background, alpha), alpha ? 4 : 3);
+}
+
+void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report) {
+    const std::vector<std::byte> bytes = encode_picture(frame, options);
     write_file(options.output, bytes, options.no_clobber);
+    if (!asks_for_report(options)) return;
+    report.sha256 = sha256(bytes);
+    if (options.output == "-") return;
+    const bool beside = !options.report_path.empty() && options.report_path != "-";
+    const fs::path folder = beside ? fs::absolute(options.report_path).parent_path() : fs::current_path();
+    report.file =
+        fs::absolute(options.output).lexically_normal().lexically_proximate(folder.lexically_normal()).string();
 }
 
 void write_report(const Report& report, const PictureOptions& options) {

@@ -5,15 +5,21 @@
 
 namespace porthole::cli {
 
+/// Whether anybody is going to read the report.
+[[nodiscard]] bool asks_for_report(const PictureOptions& options);
+
 /// Finds out before the work whether its results can be written: extensions, folders,
 /// --no-clobber, and whether two of them share standard output or a file.
 /// @throws Error usage E0106, E0107; output E0801, E0804; limit E0901 when the picture's size
 ///         does not fit into the memory allowed.
 void check_outputs(const PictureOptions& options, std::uint64_t max_memory);
 
-/// Encodes `frame` as its output's extension says and writes it.
+/// `frame` as the bytes of a file whose kind the output's extension says.
+[[nodiscard]] std::vector<std::byte> encode_picture(const Frame& frame, const PictureOptions& options);
+
+/// Writes `frame` and says in `report` what was written where.
 /// @throws Error output E08xx.
-void write_picture(const Frame& frame, const PictureOptions& options);
+void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report);
 
 /// The report to --report and --json, whichever were asked for. @throws Error output E08xx.
 void write_report(const Report& report, const PictureOptions& options);

@@ -32,17 +32,18 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     const Stopwatch writing;
     if (!picture.output.empty()) {
         out.progress("write", 0);
-        write_picture(frame, picture);
+        write_picture(frame, picture, report.picture);
         out.done(picture.output == "-" ? "standard output" : escaped(picture.output));
     }
     report.run.write = writing.seconds();
 
     report.view = view;
+    report.options.render = picture.render;
     report.nothing_to_cut = true;
     report.frame_rays = frame.rays;
     report.run.threads = thread_count(control);
     report.run.total = total.seconds();
-    fill_report(report, "render", scene, picture);
+    fill_report(report, "render", scene, options.common, picture);
     write_report(report, picture);
     return kExitDone;
 }

@@ -109,12 +109,12 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
     if (!options.debug_dir.empty()) write_debug_pictures(options, revealed);
     if (!picture.output.empty() && opened > 0) {
         out.progress("write", 0);
-        write_picture(revealed.frame, picture);
+        write_picture(revealed.frame, picture, report.picture);
         out.done(picture.output == "-" ? "standard output" : escaped(picture.output));
     }
     report.run.load = loaded, report.run.build = built;
     report.run.write = writing.seconds(), report.run.total = total.seconds();
-    fill_report(report, "reveal", scene, picture);
+    fill_report(report, "reveal", scene, options.common, picture);
     write_report(report, picture);
 
     if (opened == 0) {

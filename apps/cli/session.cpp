@@ -4,6 +4,10 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "picture.h"
+#include "porthole/base/sha256.h"
+#include "porthole/io/files.h"
+
 namespace porthole::cli {
 
 int exit_code(ErrorKind kind) {
@@ -53,12 +57,24 @@ void require_parts(const Scene& scene) {
         throw Error(ErrorKind::input, "E0206", scene.source, "holds no triangles: there is nothing to draw");
 }
 
-void fill_report(Report& report, const char* command, const Scene& scene, const PictureOptions& picture) {
+void fill_report(Report& report, const char* command, const Scene& scene, const CommonOptions& common,
+                 const PictureOptions& picture) {
     report.version = PORTHOLE_VERSION;
     report.command = command;
-    report.model_path = scene.source;
-    report.parts = std::int64_t(scene.parts.size());
-    report.triangles = std::int64_t(triangle_count(scene));
+    report.model.path = common.model;
+    report.model.format = common.load.format;
+    report.model.time = common.load.time;
+    report.model.up = common.load.up;
+    report.model.metres_per_unit = common.load.metres_per_unit;
+    if (common.model != "-" && asks_for_report(picture)) {
+        const FileBytes file{std::filesystem::path(common.model)};
+        report.model.bytes = file.bytes().size();
+        report.model.sha256 = sha256(file.bytes());
+    }
+    report.picture.bits = picture.bits;
+    report.picture.no_background = picture.no_background;
+    report.model.parts = std::int64_t(scene.parts.size());
+    report.model.triangles = std::int64_t(triangle_count(scene));
     const CameraParams& camera = picture.camera;
     if (camera.position || camera.direction)
         report.camera = "custom";

@@ -38,7 +38,8 @@ void limit_memory(const CommonOptions& options);
 void require_parts(const Scene& scene);
 
 /// What every report says of the program, the model and the run.
-void fill_report(Report& report, const char* command, const Scene& scene, const PictureOptions& picture);
+void fill_report(Report& report, const char* command, const Scene& scene, const CommonOptions& common,
+                 const PictureOptions& picture);
 
 /// The subcommands. Each returns an exit code or throws Error or Cancelled.
 int run_reveal(const RevealOptions& options, Output& out, const Control& control);

@@ -12,6 +12,7 @@
 #include "porthole/hole/hole.h"
 #include "porthole/scene/scene.h"
 #include "porthole/trace/bvh.h"
+#include "porthole/trace/solid.h"
 #include "porthole/trace/visibility.h"
 
 namespace porthole {
@@ -43,6 +44,7 @@ struct PlanParams {
     HoleStyle style = HoleStyle::hole;
     std::optional<Length> depth; ///< width of the band; unset: 5 % (hole), 4 px (paper)
     Tight tight = Tight::refuse;
+    CapOverrides solidity; ///< parts that the user says are solids or shells
 };
 
 /// What does not depend on the view: who is a target, who may be cut. Move-only; needs its
@@ -92,10 +94,12 @@ struct ViewPlan {
     Hole hole;                       ///< empty if nothing hides the targets
     std::vector<int> paper_depth_px; ///< style paper: k per opened target
     Cut cut;                         ///< empty if nothing is to be cut
+    std::vector<MeshSolid> solids;   ///< by mesh, judged for the cut set; empty before plan_caps()
+    CapRules caps;                   ///< of the cut set; plan_caps()
 
     struct Rays {
         std::int64_t targets = 0, alone = 0, spans = 0, enclosing = 0, loose = 0;
-        std::int64_t paper_step1 = 0, paper_step2 = 0;
+        std::int64_t paper_step1 = 0, paper_step2 = 0, caps = 0;
     } rays;
 
     [[nodiscard]] bool nothing_revealed() const { return opened.empty(); }
@@ -108,6 +112,11 @@ struct ViewPlan {
 /// Safe to call concurrently on one subject.
 [[nodiscard]] ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params = {},
                                  const Control& control = {});
+
+/// Decides which parts of the cut set are capped: fills solids, caps and cut.cap of a plan.
+/// Not part of plan_view(), as views that are only weighed need no caps.
+/// Cost: find_solids(), find_holders() and classify() of the cut set.
+void plan_caps(const Subject& subject, ViewPlan& plan, const CapOverrides& overrides = {}, const Control& control = {});
 
 /// Width of the band in pixels that `params` ask for in `view`.
 [[nodiscard]] int band_depth_px(const Subject& subject, const View& view, const PlanParams& params);

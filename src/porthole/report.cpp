@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "porthole/hole/distance.h"
 #include "porthole/hole/metrics.h"
@@ -58,12 +57,19 @@ TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const 
     r.pixels_alone = target.pixels_alone;
     r.thin = target.thin;
     r.depth_asked_px = plan.depth_px;
+    r.alone = encode_runs(target.alone);
     if (target.pixels_alone + target.pixels_outside > 0)
         r.off_image_share = double(target.pixels_outside) / double(target.pixels_alone + target.pixels_outside);
     if (target.absent)
         r.refused = "absent";
     else if (target.refused)
         r.refused = "no room";
+
+    Mask nearest_of_all(target.alone.window().intersected(plan.target_ids.window()), 0);
+    const Rect around = nearest_of_all.window();
+    for (int y = around.y0; y < around.y1; ++y)
+        for (int x = around.x0; x < around.x1; ++x) nearest_of_all(x, y) = plan.target_ids.id(x, y) == target.part;
+    r.mask = encode_runs(nearest_of_all);
 
     const Rect box = target.alone.window().intersected(before.ids.window());
     std::int64_t seen_before = 0, seen_after = 0, among = 0, among_seen = 0;
@@ -165,6 +171,7 @@ PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, cons
     for (std::size_t i = 0; i < seen_before.size(); ++i)
         if (seen_before[i] && !seen_after[i]) r.parts_lost.push_back(subject.scene().parts[i].path);
 
+    r.mask = encode_runs(plan.hole.mask);
     if (!plan.cut.empty()) {
         const Rect box = plan.hole.window.intersected(w.window());
         for (int y = box.y0; y < box.y1; ++y)
@@ -174,20 +181,14 @@ PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, cons
     return r;
 }
 
-nlohmann::ordered_json json_of(const std::optional<double>& v) {
-    return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json(nullptr);
-}
-
-nlohmann::ordered_json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
-
 } // namespace
 
 Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, const Frame& before, const Frame& after,
                const Control& control) {
     const Scene& scene = subject.scene();
     Report report;
-    report.parts = std::int64_t(scene.parts.size());
-    report.triangles = std::int64_t(triangle_count(scene));
+    report.model.parts = std::int64_t(scene.parts.size());
+    report.model.triangles = std::int64_t(triangle_count(scene));
     report.view = plan.view;
     report.nothing_to_cut = plan.nothing_to_cut();
 
@@ -211,93 +212,6 @@ Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, con
     report.frame_rays.reflection += plan.cut.empty() ? 0 : after.rays.reflection;
     report.frame_rays.refraction += plan.cut.empty() ? 0 : after.rays.refraction;
     return report;
-}
-
-std::string to_json(const Report& report) {
-    using Json = nlohmann::ordered_json;
-    Json j;
-    j["version"] = report.version;
-    j["command"] = report.command;
-    j["model"] = {{"path", report.model_path}, {"parts", report.parts}, {"triangles", report.triangles}};
-    const Affine3d c(report.view.world_from_camera);
-    j["camera"] = {{"name", report.camera},
-                   {"orthographic", report.view.orthographic},
-                   {"position", json_of(c.p)},
-                   {"right", json_of(c.x)},
-                   {"up", json_of(c.y)},
-                   {"forward", json_of(-c.z)},
-                   {report.view.orthographic ? "half_height" : "tan_half_fov_y", report.view.half_height}};
-    j["size"] = {report.view.width, report.view.height};
-    j["nothing_to_cut"] = report.nothing_to_cut;
-
-    Json targets = Json::array();
-    for (const TargetReport& t : report.targets)
-        targets.push_back(
-            {{"id", index(t.part)},
-             {"path", t.path},
-             {"pixels_alone", t.pixels_alone},
-             {"visible_before", json_of(t.visible_before)},
-             {"visible_after", json_of(t.visible_after)},
-             {"visible_among_targets", json_of(t.visible_among_targets)},
-             {"contour_pixels", t.contour_pixels},
-             {"components", t.components},
-             {"closed", t.closed},
-             {"covered", json_of(t.covered)},
-             {"clearance_px",
-              {{"min", json_of(t.clearance_min_px)},
-               {"p5", json_of(t.clearance_p5_px)},
-               {"mean", json_of(t.clearance_mean_px)}}},
-             {"depth_asked_px", t.depth_asked_px},
-             {"depth_used_px",
-              {{"min", json_of(t.depth_used_min_px)},
-               {"mean", json_of(t.depth_used_mean_px)},
-               {"max", json_of(t.depth_used_max_px)}}},
-             {"ring", {{"mean", json_of(t.ring_mean)}, {"p5", json_of(t.ring_p5)}, {"min", json_of(t.ring_min)}}},
-             {"off_image_share", t.off_image_share},
-             {"thin", t.thin},
-             {"refused", t.refused.empty() ? Json(nullptr) : Json(t.refused)}});
-    j["targets"] = targets;
-    j["cut_parts"] = report.cut_parts;
-    const PictureReport& p = report.picture;
-    j["picture"] = {{"outline_iou", json_of(p.outline_iou)},         {"see_through_px", p.see_through_px},
-                    {"context_removed", json_of(p.context_removed)}, {"parts_lost", p.parts_lost},
-                    {"wall_visible", json_of(p.wall_visible)},       {"hole_pixels", p.hole_pixels}};
-
-    const ViewPlan::Rays& r = report.plan_rays;
-    const RayCounts& f = report.frame_rays;
-    const std::int64_t primary =
-        f.primary + r.targets + r.alone + r.enclosing + r.spans + r.loose + r.paper_step1 + r.paper_step2;
-    const std::int64_t all = primary + f.shadow + f.ambient + f.reflection + f.refraction;
-    j["rays"] = {{"targets", r.targets},
-                 {"targets_alone", r.alone},
-                 {"spans", r.spans},
-                 {"enclosing", r.enclosing},
-                 {"loose", r.loose},
-                 {"paper_step1", r.paper_step1},
-                 {"paper_step2", r.paper_step2},
-                 {"primary", f.primary},
-                 {"shadow", f.shadow},
-                 {"ambient", f.ambient},
-                 {"reflection", f.reflection},
-                 {"refraction", f.refraction},
-                 {"primary_share", all ? Json(double(primary) / double(all)) : Json(nullptr)}};
-
-    Json warnings = Json::array();
-    for (const Warning& w : report.warnings)
-        warnings.push_back({{"code", w.code}, {"where", w.where}, {"reason", w.reason}});
-    j["warnings"] = warnings;
-    const RunReport& run = report.run;
-    j["run"] = {{"seconds",
-                 {{"load", run.load},
-                  {"build", run.build},
-                  {"plan", run.plan},
-                  {"render", run.render},
-                  {"write", run.write},
-                  {"total", run.total}}},
-                {"threads", run.threads},
-                {"isa", run.isa},
-                {"peak_bytes", run.peak_bytes}};
-    return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 } // namespace porthole

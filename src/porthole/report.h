@@ -2,14 +2,38 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "porthole/plan.h"
-#include "porthole/render/render.h"
+#include "porthole/params.h"
 
 namespace porthole {
+
+/// A mask as text: the lengths of its runs of 0 and 1 in turn, the first of 0, row by row, in
+/// decimal with spaces between. What follows the last 1 is left out.
+struct PixelRuns {
+    Rect window;      ///< smallest one around the ones; may reach beyond the picture
+    std::string runs; ///< empty: no pixel
+    friend bool operator==(const PixelRuns&, const PixelRuns&) = default;
+};
+[[nodiscard]] PixelRuns encode_runs(const Mask& mask);
+/// Empty unless `runs` is what encode_runs makes of some mask. Cost: linear in text and window.
+[[nodiscard]] std::optional<Mask> decode_runs(const PixelRuns& runs);
+
+/// The model and how it was read.
+struct ModelReport {
+    std::string path;        ///< as given; "-": standard input
+    std::uint64_t bytes = 0; ///< of the file; 0: standard input
+    std::string sha256;      ///< of the file; empty: standard input
+    std::string format;      ///< asked for; empty: told from the content
+    double time = -1;
+    char up = 'y';
+    double metres_per_unit = 1;
+    std::int64_t parts = 0, triangles = 0;
+};
 
 /// Ratios are in [0, 1]; an empty optional is a zero denominator and becomes null.
 struct TargetReport {
@@ -28,6 +52,8 @@ struct TargetReport {
     double off_image_share = 0; ///< share of its pixels that lie in the margin around the picture
     bool thin = false;
     std::string refused; ///< empty, or "absent", "no room"
+    PixelRuns alone;     ///< pixels it covers alone, in the picture and its margin
+    PixelRuns mask;      ///< those where it is the nearest of the opened targets
 };
 
 struct PictureReport {
@@ -35,6 +61,11 @@ struct PictureReport {
     std::int64_t see_through_px = 0;     ///< model before, nothing after
     std::int64_t hole_pixels = 0;        ///< targets and band, inside the picture
     std::vector<std::string> parts_lost; ///< seen before, nowhere after
+    PixelRuns mask;                      ///< the hole, in the picture and its margin
+    std::string file;                    ///< relative to the report's folder; empty: none, or standard output
+    std::string sha256;                  ///< of the file; empty: no picture was written
+    int bits = 8;                        ///< per channel
+    bool no_background = false;          ///< alpha in the file
 };
 
 struct RunReport {
@@ -45,10 +76,12 @@ struct RunReport {
 };
 
 struct Report {
-    std::string version, command, model_path;
-    std::int64_t parts = 0, triangles = 0;
+    std::string version, command;
+    ModelReport model;
     View view;
-    std::string camera; ///< what was asked for
+    std::string camera;                         ///< what was asked for
+    RevealParams options;                       ///< with `view`, all that decides the pixels; not its camera
+    std::map<PartId, std::string> option_paths; ///< of the parts that `options` name
     bool nothing_to_cut = false;
     std::vector<TargetReport> targets;
     std::vector<std::string> cut_parts; ///< paths of the parts that were cut
@@ -66,8 +99,20 @@ struct Report {
 [[nodiscard]] Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, const Frame& before,
                              const Frame& after, const Control& control = {});
 
+/// Says in `report` with which options a picture of `scene` was made.
+void set_options(Report& report, const Scene& scene, const RevealParams& options);
+
 /// The report as JSON text, two spaces indented, with a final newline; names are made valid
-/// UTF-8. Numbers that differ between runs are all under "run".
+/// UTF-8. Numbers that differ between runs are all under "run". The schema: docs/report.md.
 [[nodiscard]] std::string to_json(const Report& report);
+
+/// What a report says is needed to make its picture again: version, command, model, view (in
+/// `options` too), options, isa, the picture's file and mask, and of each target part, path,
+/// masks and thin. The figures stay as they are in the text.
+/// @param where  the file that errors name.
+/// @throws Error input E0220 naming the JSON pointer: not JSON, not a report, an option that is
+///         missing, unknown or out of range; limit E0902 above 64 MB or 4 million values.
+/// Never crashes on any text. Cost: linear in the text.
+[[nodiscard]] Report read_report(std::string_view text, const std::string& where);
 
 } // namespace porthole

@@ -31,6 +31,16 @@ std::vector<PartId> kept_parts(const Scene& scene, const RevealParams& params) {
 
 } // namespace
 
+Subject make_subject(const MeshBvhs& meshes, const RevealParams& params, const Control& control) {
+    return make_subject(meshes, params.targets, kept_parts(meshes.scene(), params), params.cut_only, control);
+}
+
+RenderParams look_of(const RevealParams& params) {
+    RenderParams look = params.render;
+    if (params.plan.style == HoleStyle::paper) look.shading = Shading::flat;
+    return look;
+}
+
 Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Control& control) {
     const Scene& scene = meshes.scene();
     const auto start = std::chrono::steady_clock::now();
@@ -40,7 +50,7 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
 
     // Who is to be seen, who may be cut, from where.
     report_progress("plan", 0);
-    const Subject subject = make_subject(meshes, params.targets, kept_parts(scene, params), params.cut_only, control);
+    const Subject subject = make_subject(meshes, params, control);
     const auto choose = [&] {
         const FrameSubject framing = frame_subject(scene, params.targets, control);
         if (!is_auto(params.camera)) return make_view(scene, framing, params.camera, params.width, params.height);
@@ -52,13 +62,15 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
 
     Revealed revealed;
     revealed.plan = plan_view(subject, view, params.plan, control);
+    if (params.plan.style != HoleStyle::paper) plan_caps(subject, revealed.plan, params.plan.solidity, control);
     const double planned = seconds_since(start);
     report_progress("plan", 1);
 
     // The plain picture first; the hole is drawn over it, so nothing changes outside.
-    RenderParams look = params.render;
-    if (params.plan.style == HoleStyle::paper) look.shading = Shading::flat;
-    const Bvh opened = build_bvh(meshes, all_parts(scene), revealed.plan.cut.role, revealed.plan.cut.level);
+    const RenderParams look = look_of(params);
+    Bvh opened = build_bvh(meshes, all_parts(scene), revealed.plan.cut.role, revealed.plan.cut.level);
+    const Caps caps = trace_caps(opened, revealed.plan.cut, revealed.plan.solids, control, &revealed.plan.rays.caps);
+    add_caps(opened, caps.mesh);
     Frame plain;
     if (!revealed.plan.nothing_revealed()) {
         plain = render(subject.whole, nullptr, view, look, nullptr, nullptr, control);
@@ -66,7 +78,7 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
             revealed.frame = plain;
         } else {
             const Bvh targets = build_bvh(meshes, revealed.plan.opened);
-            revealed.frame = render(opened, &targets, view, look, &revealed.plan.cut, &plain, control);
+            revealed.frame = render(opened, &targets, view, look, &revealed.plan.cut, &plain, control, &caps);
         }
     } else {
         plain.ids = trace_ids(subject.whole, view, view.window(), control, &plain.rays.primary);
@@ -75,6 +87,8 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
 
     revealed.report = measure(subject, revealed.plan, opened, plain,
                               revealed.plan.nothing_revealed() ? plain : revealed.frame, control);
+    set_options(revealed.report, scene, params);
+    revealed.report.options.view = view;
     revealed.report.camera = is_auto(params.camera)         ? "auto"
                              : params.camera.name == "auto" ? "custom"
                                                             : params.camera.name;

@@ -12,6 +12,12 @@ struct Revealed {
     Report report; ///< without version, command, model_path, load, write and total seconds
 };
 
+/// Who is seen and who may be cut when `params` are asked for.
+[[nodiscard]] Subject make_subject(const MeshBvhs& meshes, const RevealParams& params, const Control& control = {});
+
+/// How both pictures, with and without the hole, are drawn when `params` are asked for.
+[[nodiscard]] RenderParams look_of(const RevealParams& params);
+
 /// Opens a hole around the targets in whatever hides them and draws the picture.
 ///
 /// @param meshes  from build_mesh_bvhs; the scene behind it must hold at least one part.

@@ -69,6 +69,12 @@ struct Rgba8 {
     friend constexpr bool operator==(const Rgba8&, const Rgba8&) = default;
 };
 
+/// Values of a file's channels, of 8 or 16 bits.
+struct Rgba16 {
+    std::uint16_t r = 0, g = 0, b = 0, a = 65535;
+    friend constexpr bool operator==(const Rgba16&, const Rgba16&) = default;
+};
+
 /// Yes/no per pixel (std::vector<bool> is not thread-safe per element).
 using Mask = Image<std::uint8_t>;
 

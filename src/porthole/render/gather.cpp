@@ -30,6 +30,7 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
                   int bx, int by, Askers& askers, RayCounts& rays) {
     GBuffer& buffer = picture.buffer;
     Samples16 samples;
+    samples.at_centres = true;
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {
         const int x = bx + i % kCell, y = by + i / kCell;
@@ -58,7 +59,13 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
         buffer.ids.depth(x, y) = seen.depth[i];
         if (!hit.any()) continue;
         pixel.triangle = hit.triangle, pixel.u = hit.u, pixel.v = hit.v;
-        const SurfacePoint point = surface_point(placements[index(hit.part)], hit, seen.direction[i]);
+        const SurfacePoint point =
+            picture.camera.surface(placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
+        if (hit.cap) pixel.flags |= Pixel::cap;
+        const Cut* cut = picture.camera.cut();
+        if (seen.in_hole[i] && !point.front && cut->role[index(hit.part)] == CutRole::cut_set &&
+            cut->cap_of(hit.part) == CapRule::none)
+            pixel.flags |= Pixel::open_back;
         pixel.normal = pack_normal(point.normal);
         points[n] = {point.position, point.start, point.flat_normal, point.normal, seen.in_hole[i], cell_rank(x, y)};
         pixels[n++] = {x, y};

@@ -39,11 +39,13 @@ namespace porthole {
 struct Pixel {
     enum Flag : std::uint8_t {
         traced = 1,
-        in_hole = 2,   ///< its sample obeys the cut
-        on_target = 4, ///< and sees an opened target
-        may_open = 8,  ///< some sample of the pixel may be in the hole
-        rim = 16,      ///< the rim may pass through the pixel: every sample is needed
-        on_rim = 32    ///< its sample lies on the line along the rim
+        in_hole = 2,    ///< its sample obeys the cut
+        on_target = 4,  ///< and sees an opened target
+        may_open = 8,   ///< some sample of the pixel may be in the hole
+        rim = 16,       ///< the rim may pass through the pixel: every sample is needed
+        on_rim = 32,    ///< its sample lies on the line along the rim
+        cap = 64,       ///< and sees the cut through solid material
+        open_back = 128 ///< or the back of a cut part that has no caps
     };
     std::uint32_t triangle = 0;
     float u = 0, v = 0;
@@ -81,12 +83,15 @@ struct GBuffer {
     [[nodiscard]] Rect window() const { return pixels.window(); }
     [[nodiscard]] Hit hit(int x, int y) const {
         const Pixel& p = pixels(x, y);
-        return {ids.id(x, y), p.triangle, p.u, p.v};
+        return {ids.id(x, y), p.triangle, p.u, p.v, p.has(Pixel::cap)};
     }
-    /// Pixels with the same key may share light: same part, same side of the rim.
-    [[nodiscard]] std::uint32_t key(int x, int y) const { return key(ids.id(x, y), pixels(x, y).has(Pixel::in_hole)); }
-    [[nodiscard]] static std::uint32_t key(PartId part, bool in_hole) {
-        return part == kNoPart ? kNoKey : index(part) * 2 + (in_hole ? 1u : 0u);
+    /// Pixels with the same key may share light: same part, same side of the rim, both of its
+    /// surface or both of the cut through it.
+    [[nodiscard]] std::uint32_t key(int x, int y) const {
+        return key(ids.id(x, y), pixels(x, y).has(Pixel::in_hole), pixels(x, y).has(Pixel::cap));
+    }
+    [[nodiscard]] static std::uint32_t key(PartId part, bool in_hole, bool cap) {
+        return part == kNoPart ? kNoKey : index(part) * 4 + (cap ? 2u : 0u) + (in_hole ? 1u : 0u);
     }
     static constexpr std::uint32_t kNoKey = 0xFFFFFFFFu;
 };

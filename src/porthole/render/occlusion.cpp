@@ -11,6 +11,9 @@ constexpr int kLoneLampRays = 4; // of the 16 rays of a lone point
 constexpr int kLoneAmbientRays = kLanes - kLoneLampRays;
 constexpr float kGrazing = 0.01f;
 
+/// Caps are there for rays that start in the hole.
+constexpr std::uint32_t ray_mask(bool in_hole) { return in_hole ? kMaskEverything : kMaskAll; }
+
 } // namespace
 
 Occlusion::Occlusion(const Bvh& bvh, const Cut* cut, const Lighting& lighting, const RenderParams& params)
@@ -71,7 +74,7 @@ void Occlusion::lamps(std::span<const Asker> points, int each, Vec3f* shares, Ra
                 tint[i] = {1, 1, 1};
                 const std::size_t k = std::size_t(i);
                 if (k < points.size() && asks[i] && points[k].in_hole == in_hole) {
-                    packet.set(i, points[k].start, direction[i], 0, tfar[i]);
+                    packet.set(i, points[k].start, direction[i], 0, tfar[i], ray_mask(in_hole));
                     ++rays.shadow;
                 } else {
                     packet.clear(i);
@@ -129,7 +132,7 @@ void Occlusion::ambient_group(std::span<const Asker> points, Ambient* sums, bool
                 const float w = std::abs(c);
                 if (w < kGrazing || dot(p.flat_normal, d) <= 0) continue;
                 sums[k].all += w;
-                packet.set(lanes, p.start, d, 0, radius * ray.reach);
+                packet.set(lanes, p.start, d, 0, radius * ray.reach, ray_mask(in_hole));
                 weight[lanes] = w;
                 asker[lanes] = k;
                 if (++lanes == kLanes) flush();
@@ -152,7 +155,7 @@ Reach Occlusion::reach(const Asker& p, RayCounts& rays) const {
             const float c = dot(p.normal, ray.axis);
             const Vec3f d = c < 0 ? -ray.axis : ray.axis;
             if (std::abs(c) < kGrazing || dot(p.flat_normal, d) <= 0) continue;
-            packet.set(lanes, p.start, d, 0, radius * ray.reach);
+            packet.set(lanes, p.start, d, 0, radius * ray.reach, ray_mask(p.in_hole));
             weight[lanes++] = std::abs(c);
             all_ambient += std::abs(c);
         }
@@ -168,7 +171,7 @@ Reach Occlusion::reach(const Asker& p, RayCounts& rays) const {
                 if (!lamp_ray(lighting_->lamps[l], l, p, k * (kDiscPoints / kLoneLampRays) + 1, direction, tfar,
                               weight[lanes]))
                     continue;
-                packet.set(lanes, p.start, direction, 0, tfar);
+                packet.set(lanes, p.start, direction, 0, tfar, ray_mask(p.in_hole));
                 all_lamps += weight[lanes++];
             }
     }

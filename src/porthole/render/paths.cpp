@@ -1,6 +1,7 @@
 #include "porthole/render/paths.h"
 
 #include "porthole/render/bxdf.h"
+#include "porthole/render/cap.h"
 
 namespace porthole {
 
@@ -57,6 +58,30 @@ Vec3f facet_normal(Vec3f normal, float alpha, int i, int n) {
 
 } // namespace
 
+namespace {
+
+/// What a secondary ray hit; of a cap mesh the part whose material it shows.
+Hit hit_of(const Bvh& bvh, const RayHit16& rays, int lane) {
+    if (rays.part(lane) != kCapPart) return {rays.part(lane), rays.triangle[lane], rays.u[lane], rays.v[lane]};
+    const SurfaceRef& face = bvh.caps()->face[rays.triangle[lane]];
+    return {face.part, face.triangle, face.u, face.v, true};
+}
+
+SurfacePoint cap_mesh_point(const RayHit16& rays, int lane) {
+    const Vec3f direction = rays.direction(lane);
+    SurfacePoint p;
+    p.position = rays.origin(lane) + direction * rays.tfar[lane];
+    p.normal = normalize(Vec3f{rays.ng_x[lane], rays.ng_y[lane], rays.ng_z[lane]}, -direction);
+    if (dot(p.normal, direction) > 0) p.normal = -p.normal;
+    p.flat_normal = p.normal;
+    const float off = 1e-4f * rays.tfar[lane];
+    p.start = p.position + p.normal * off;
+    p.beyond = p.position - p.normal * off;
+    return p;
+}
+
+} // namespace
+
 void Media::leave(std::int32_t m) {
     for (int i = count; i-- > 0;) {
         if (material[std::size_t(i)] != m) continue;
@@ -94,9 +119,13 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
     const Stage& stage = *stage_;
     const Placement& placement = stage.placements[index(hit.part)];
     const Tint tint = on_target && !stage.tints.empty() ? stage.tints[index(hit.part)] : Tint{};
-    Substance s = substance(stage.scene, placement, hit, tint);
+    const auto cap = [&] {
+        const PixelPoint p = stage.cut->view.project(point.position);
+        return cap_substance(stage.scene, placement, hit, stage.params, {p.x, p.y}, stage.cut->view.height);
+    };
+    Substance s = hit.cap ? cap() : substance(stage.scene, placement, hit, tint);
     const Vec3f to_eye = -ray.direction;
-    const Vec3f normal = s.material->normal_texture.texture >= 0
+    const Vec3f normal = !hit.cap && s.material->normal_texture.texture >= 0
                              ? mapped_normal(stage.scene, placement, hit, point, *s.material, ray.direction)
                              : point.normal;
     Radiance& sum = radiance_[ray.slot];
@@ -218,7 +247,7 @@ void Shader::trace_newest() {
         if (std::size_t(i) >= n) continue;
         ++(ray.through ? rays_->refraction : rays_->reflection);
         if (cuts && ray.in_hole) {
-            open.set(i, ray.origin, ray.direction, 0, kInfinity);
+            open.set(i, ray.origin, ray.direction, 0, kInfinity, kMaskEverything);
             intersect_cut(stage.bvh, open, i, stage.cut);
         } else {
             packet.set(i, ray.origin, ray.direction, 0, kInfinity);
@@ -246,10 +275,10 @@ void Shader::trace_newest() {
             ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);
         if (largest(ray.weight) < least_weight(ray)) continue;
         Hit& h = hit[std::size_t(i)];
-        h = {from.part(i), from.triangle[i], from.u[i], from.v[i]};
+        h = hit_of(stage.bvh, from, i);
         const Placement& placement = stage.placements[index(h.part)];
         SurfacePoint& p = surface[std::size_t(i)];
-        p = surface_point(placement, h, ray.direction);
+        p = h.cap ? cap_mesh_point(from, i) : surface_point(placement, h, ray.direction);
         const Material& m = stage.scene.materials[placement.mesh->material_of(h.triangle)];
         // Clear glass has no matte layer that shadows could fall on.
         const bool clear = m.transmission > 0.99f && m.transmission_texture.texture < 0;

@@ -1,9 +1,12 @@
 #include "porthole/render/primary.h"
 
+#include "porthole/render/cap.h"
+
 namespace porthole {
 
-Camera::Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, float rim_px)
-    : bvh_(&bvh), targets_(targets), view_(&view), cut_(cut), rim_px_(rim_px) {
+Camera::Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, float rim_px, const Caps* caps)
+    : bvh_(&bvh), targets_(targets), view_(&view), cut_(cut), caps_(caps && !caps->empty() ? caps : nullptr),
+      rim_px_(rim_px) {
     if (!cut) return;
     tolerance_ = float(1e-6 * scene_bounds(bvh.scene()).diagonal());
     for (std::size_t i = 0; i < cut->role.size(); ++i) {
@@ -92,11 +95,9 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         }
     }
 
-    const std::size_t levels = cut_->levels.size();
-    float kept[kLanes], loose[kLanes], cut_set[kMostLevels][kLanes]; // where rays start; +infinity: not at all
+    float kept[kLanes], loose[kLanes]; // where rays start; +infinity: not at all
     for (int i = 0; i < kLanes; ++i) {
         kept[i] = loose[i] = kInfinity;
-        for (std::size_t k = 0; k < levels; ++k) cut_set[k][i] = kInfinity;
         if (!samples.active[i] || !samples.may_open[i]) continue;
         const float x = samples.x[i], y = samples.y[i];
         seen.in_hole[i] = seen.on_target[i] || cut_->distance_at(x, y) <= 0;
@@ -107,19 +108,66 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         kept[i] = 0;
         loose[i] = start(cut_->loose_depth_at(x, y));
         // Behind a target the cut set cannot be seen, in front of it nothing is left of it.
-        for (std::size_t k = 0; k < levels && !seen.on_target[i]; ++k)
-            cut_set[k][i] = start(cut_->depth_at(x, y, k).depth);
         // What lies on the target counts as behind it.
         if (seen.on_target[i]) seen.depth[i] = target_depth[i] - std::max(tolerance_, rounding(target_depth[i]));
     }
     // Where the underside of a cut wall lies on the floor it stood on, the floor is seen.
     if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, 0, seen, rays);
     if (has_loose_) trace_role(kMaskLoose, loose, depth_per_t, 0, seen, rays);
-    for (std::size_t k = 0; k < levels && has_cut_set_; ++k)
-        trace_role(level_mask(k), cut_set[k], depth_per_t, tolerance_, seen, rays);
+    if (has_cut_set_) trace_levels(samples, depth_per_t, seen, rays);
     for (int i = 0; i < kLanes; ++i)
         if (seen.on_target[i]) seen.depth[i] = target_depth[i];
     if (rim_px_ > 0) mark_rim(samples, depth_per_t, seen, rays);
+}
+
+void Camera::trace_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
+                          RayCounts& rays) const {
+    const std::size_t levels = cut_->levels.size();
+    CutLanes lanes;
+    float depths[kMostLevels][kLanes];
+    RayHit16 packet;
+    for (int i = 0; i < kLanes; ++i) {
+        for (std::size_t k = 0; k < levels; ++k) lanes.t[k][i] = kInfinity;
+        // Behind a target the cut set cannot be seen, in front of it nothing is left of it.
+        const bool asks = seen.in_hole[i] && !seen.on_target[i];
+        packet.clear(i);
+        if (!asks) continue;
+        packet.set(i, seen.origin[i], seen.direction[i], 0, kInfinity);
+        for (std::size_t k = 0; k < levels; ++k) {
+            const CutDepth cut = cut_->depth_at(samples.x[i], samples.y[i], k);
+            depths[k][i] = cut.depth;
+            lanes.t[k][i] = std::max(0.0f, cut.depth) / depth_per_t[i];
+            lanes.chamfer[k][i] = cut.chamfer;
+        }
+    }
+    CapLanes capped;
+    if (caps_ && samples.at_centres) {
+        for (int i = 0; i < kLanes; ++i)
+            for (std::size_t k = 0; k < levels; ++k)
+                if (lanes.t[k][i] < kInfinity)
+                    capped.cap[k][i] = caps_->at(k, int(std::floor(samples.x[i])), int(std::floor(samples.y[i])));
+    } else if (caps_) {
+        capped = find_caps(*bvh_, *cut_, caps_->solids, packet, lanes);
+    }
+    for (std::size_t k = 0; k < levels; ++k) {
+        for (int i = 0; i < kLanes; ++i) {
+            const SurfaceRef& cap = capped.cap[k][i];
+            if (cap.part == kNoPart || !(lanes.t[k][i] < kInfinity)) continue;
+            // Nothing of the level can be nearer than its own cut.
+            lanes.t[k][i] = kInfinity;
+            const float depth = depths[k][i];
+            if (!(depth < seen.depth[i] - std::max(tolerance_, rounding(depth)))) continue;
+            seen.hit[i] = {cap.part, cap.triangle, cap.u, cap.v, true};
+            seen.depth[i] = depth;
+        }
+        trace_role(level_mask(k), lanes.t[k], depth_per_t, tolerance_, seen, rays);
+    }
+}
+
+SurfacePoint Camera::surface(const std::vector<Placement>& placements, const Hit& hit, float x, float y, float depth,
+                             Vec3f direction) const {
+    if (hit.cap) return cap_point(*cut_, cut_->level_of(hit.part), x, y, depth);
+    return surface_point(placements[index(hit.part)], hit, direction);
 }
 
 void Camera::mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,

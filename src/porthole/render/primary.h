@@ -10,6 +10,7 @@ namespace porthole {
 struct Samples16 {
     float x[kLanes] = {}, y[kLanes] = {};
     bool active[kLanes] = {};
+    bool at_centres = false;    ///< of pixels, all of them
     bool may_open[kLanes] = {}; ///< the sample's pixel can have samples in the hole
 };
 
@@ -28,7 +29,9 @@ class Camera {
 public:
     /// @param targets, cut  both null for a plain picture.
     /// @param rim_px        width of the line along the rim.
-    Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, float rim_px);
+    /// @param caps          of the cut; may be null.
+    Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, float rim_px,
+           const Caps* caps = nullptr);
 
     /// Nearest hits. A sample that may open asks the targets first: one that hits sees the
     /// target, or what is kept in front of it; else it is in the hole where the rim's signed
@@ -36,17 +39,25 @@ public:
     /// see the plain scene.
     [[nodiscard]] Seen16 trace(const Samples16& samples, RayCounts& rays) const;
 
+    /// The point that a sample at continuous pixel position (x, y) sees.
+    [[nodiscard]] SurfacePoint surface(const std::vector<Placement>& placements, const Hit& hit, float x, float y,
+                                       float depth, Vec3f direction) const;
+    [[nodiscard]] const Cut* cut() const { return cut_; }
+
 private:
     void trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const;
     void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],
                     float tolerance, Seen16& seen, RayCounts& rays) const;
 
+    void trace_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
+                      RayCounts& rays) const;
     void mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen, RayCounts& rays) const;
 
     const Bvh* bvh_;
     const Bvh* targets_;
     const View* view_;
     const Cut* cut_;
+    const Caps* caps_;
     float rim_px_ = 0;
     float tolerance_ = 0; ///< metres in front of a target that count as behind it
     bool has_kept_ = false, has_cut_set_ = false, has_loose_ = false;

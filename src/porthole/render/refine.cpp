@@ -68,12 +68,13 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
             shader.miss(slot);
             continue;
         }
-        const SurfacePoint p = surface_point(stage.placements[index(hit.part)], hit, seen.direction[i]);
+        const SurfacePoint p =
+            picture.camera.surface(stage.placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
         // Each sample of a pixel takes another part of the patterns.
         const int pattern = cell_rank(pixels[i].x, pixels[i].y) + s * 5;
         Reach reach;
         if (!flat) {
-            const std::uint32_t key = GBuffer::key(hit.part, seen.in_hole[i]);
+            const std::uint32_t key = GBuffer::key(hit.part, seen.in_hole[i], hit.cap);
             if (const auto light = borrow_light(buffer, key, p.normal, samples.x[i], samples.y[i]))
                 reach = *light;
             else
@@ -105,7 +106,8 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
                 continue;
             }
             const Vec3f direction = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
-            const SurfacePoint point = surface_point(stage.placements[index(hit.part)], hit, direction);
+            const SurfacePoint point = picture.camera.surface(stage.placements, hit, float(x) + 0.5f, float(y) + 0.5f,
+                                                              buffer.ids.depth(x, y), direction);
             const Reach reach = flat ? Reach{} : filtered.reach(x, y);
             buffer.light(x, y) = PixelLight(reach);
             shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole), cell_rank(x, y)), hit, point, reach,

@@ -84,16 +84,17 @@ Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, c
     Picture picture(view, params, camera, view.window());
     mark_everything(picture);
     draw(picture, bvh, nullptr, nullptr, nullptr, control);
-    return {std::move(picture.color), std::move(picture.buffer.ids), picture.rays.get()};
+    return {std::move(picture.color), std::move(picture.buffer.ids), {}, picture.rays.get()};
 }
 
 Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut& cut,
-                const Frame& under, const Control& control) {
+                const Frame& under, const Caps* caps, const Control& control) {
     Frame frame = under;
     frame.rays = {};
+    frame.inside = Mask(view.window(), 0);
     const Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
     if (window.empty()) return frame;
-    const Camera camera(bvh, targets, view, &cut, 0.0f);
+    const Camera camera(bvh, targets, view, &cut, 0.0f, caps);
     Picture picture(view, params, camera, window);
     mark_hole(picture, cut);
     draw(picture, bvh, targets, &cut, &under.ids, control);
@@ -106,6 +107,9 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
             if (!pixel.has(Pixel::in_hole)) continue;
             frame.ids.id(x, y) = picture.buffer.ids.id(x, y);
             frame.ids.depth(x, y) = picture.buffer.ids.depth(x, y);
+            frame.inside(x, y) = pixel.has(Pixel::cap)         ? std::uint8_t(Frame::cap)
+                                 : pixel.has(Pixel::open_back) ? std::uint8_t(Frame::open_back)
+                                                               : std::uint8_t{0};
         }
     frame.rays = picture.rays.get();
     return frame;
@@ -114,11 +118,11 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
 } // namespace
 
 Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* cut,
-             const Frame* under, const Control& control) {
+             const Frame* under, const Control& control, const Caps* caps) {
     check(params);
     assert(!cut == !under);
     try {
-        return cut ? draw_hole(bvh, targets, view, params, *cut, *under, control)
+        return cut ? draw_hole(bvh, targets, view, params, *cut, *under, caps, control)
                    : draw_plain(bvh, view, params, control);
     } catch (const std::bad_alloc&) {
         throw Error(ErrorKind::limit, "E0902", "render",

@@ -11,11 +11,19 @@
 #include "porthole/base/view.h"
 #include "porthole/scene/scene.h"
 #include "porthole/trace/bvh.h"
+#include "porthole/trace/caps.h"
 
 namespace porthole {
 
 enum class Emphasis : std::uint8_t { accent, saturate, none };
 enum class Shading : std::uint8_t { raytraced, flat };
+
+/// How the cut through solid material is drawn.
+enum class CapStyle : std::uint8_t {
+    own,  ///< the part's colour, darker or greyer than its outside
+    tint, ///< RenderParams::cap_tint
+    hatch ///< lines of constant width on the screen, in every part's own direction
+};
 enum class Lines : std::uint8_t {
     none,
     rim, ///< of the hole: its rim, and where its cut surfaces end; none with flat shading
@@ -30,6 +38,8 @@ struct RenderParams {
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
     Lines lines = Lines::rim;
+    CapStyle cap = CapStyle::own;
+    Vec3f cap_tint{0.55f, 0.09f, 0.05f}; ///< linear
     float rim_px = 1.5f; ///< width of the dark line along the hole's rim, inside it, in pixels of a picture up to 1080
                          ///< high, in higher ones as much wider, [0, 100]; without it, shells of one colour swallow
                          ///< the hole. Never on a target
@@ -48,6 +58,12 @@ struct Frame {
     /// tint that coloured glass gives it.
     Image<Vec4f> color;
     IdBuffer ids; ///< at pixel centres: nearest part that is not cut away, and its depth
+    /// What pixel centres in the hole see of parts that are cut.
+    enum Inside : std::uint8_t {
+        cap = 1,      ///< the cut through solid material
+        open_back = 2 ///< the back of a part that has no caps: open, or around the eye
+    };
+    Mask inside; ///< 0 elsewhere; empty without a hole
     RayCounts rays;
 };
 
@@ -62,6 +78,8 @@ struct Frame {
 /// @param targets  hierarchy of the opened targets only; used with a cut: each sample inside
 ///                 or at the rim of the hole asks it first. May be null without a cut.
 /// @param cut      may be null.
+/// @param caps     of the cut, from trace_caps(); null or empty: nothing is capped. Its mesh has
+///                 been added to `bvh` if shadows and mirrors are to see it.
 /// @param under    plain frame of the same view and params; null exactly when `cut` is.
 /// @return colour, ids at pixel centres, rays spent (of this call).
 /// @throws Error usage E0140 when a parameter is out of range; limit E0902 when memory runs out;
@@ -70,6 +88,6 @@ struct Frame {
 /// Cost: 1920x1080 of an assembly of 500 thousand triangles takes about 0.6 CPU-seconds; 34
 /// bytes a pixel of the picture (with a cut: of the hole's box) on top of the frame while it runs.
 [[nodiscard]] Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params,
-                           const Cut* cut, const Frame* under, const Control& control = {});
+                           const Cut* cut, const Frame* under, const Control& control = {}, const Caps* caps = nullptr);
 
 } // namespace porthole

@@ -14,6 +14,7 @@ struct Hit {
     PartId part = kNoPart;
     std::uint32_t triangle = 0;
     float u = 0, v = 0; ///< barycentric weights of corners 1 and 2
+    bool cap = false;   ///< the cut through the part; the triangle is where the ray went into it
     [[nodiscard]] bool any() const { return part != kNoPart; }
 };
 

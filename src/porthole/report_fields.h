@@ -1,0 +1,117 @@
+// Every option that changes pixels, named once: the report writes them and reads them back.
+#pragma once
+
+#include <type_traits>
+
+#include "porthole/params.h"
+
+namespace porthole::fields {
+
+// Names of values. A new value without a name does not compile; nullptr: no value at all.
+inline const char* name_of(ContourMethod method) {
+    switch (method) {
+    case ContourMethod::exact: return "exact";
+    case ContourMethod::full: return "full";
+    case ContourMethod::paper: return "paper";
+    }
+    return nullptr;
+}
+inline const char* name_of(HoleStyle style) {
+    switch (style) {
+    case HoleStyle::hole: return "hole";
+    case HoleStyle::paper: return "paper";
+    }
+    return nullptr;
+}
+inline const char* name_of(Tight tight) {
+    switch (tight) {
+    case Tight::refuse: return "refuse";
+    case Tight::open: return "open";
+    }
+    return nullptr;
+}
+inline const char* name_of(Length::Unit unit) {
+    switch (unit) {
+    case Length::Unit::pixel: return "px";
+    case Length::Unit::percent: return "%";
+    case Length::Unit::millimetre: return "mm";
+    }
+    return nullptr;
+}
+inline const char* name_of(Emphasis emphasis) {
+    switch (emphasis) {
+    case Emphasis::accent: return "accent";
+    case Emphasis::saturate: return "saturate";
+    case Emphasis::none: return "none";
+    }
+    return nullptr;
+}
+inline const char* name_of(CapStyle cap) {
+    switch (cap) {
+    case CapStyle::own: return "own";
+    case CapStyle::tint: return "tint";
+    case CapStyle::hatch: return "hatch";
+    }
+    return nullptr;
+}
+inline const char* name_of(Lines lines) {
+    switch (lines) {
+    case Lines::none: return "none";
+    case Lines::rim: return "rim";
+    case Lines::all: return "all";
+    }
+    return nullptr;
+}
+inline const char* name_of(Shading shading) {
+    switch (shading) {
+    case Shading::raytraced: return "raytraced";
+    case Shading::flat: return "flat";
+    }
+    return nullptr;
+}
+
+/// `Params`, const or not.
+template <typename T, typename Params>
+concept Is = std::is_same_v<std::remove_const_t<T>, Params>;
+
+// for_each(params, visit) calls visit(name, field) for every field in turn. The structured
+// bindings are there so that a new field does not compile until it has a name here.
+
+template <Is<PlanParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
+    auto& [contours, style, depth, tight, solidity] = params;
+    visit("contours", contours);
+    visit("style", style);
+    visit("depth", depth);
+    visit("tight", tight);
+    visit("solid", solidity.solid);
+    visit("shell", solidity.shell);
+}
+
+template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
+    auto& [samples, ao_samples, shadows, max_bounces, shading, emphasis, lines, cap, cap_tint, rim_px, background] =
+        params;
+    visit("samples", samples);
+    visit("ao_samples", ao_samples);
+    visit("shadows", shadows);
+    visit("max_bounces", max_bounces);
+    visit("shading", shading);
+    visit("emphasis", emphasis);
+    visit("cap", cap);
+    visit("cap_tint", cap_tint);
+    visit("lines", lines);
+    visit("rim_px", rim_px);
+    visit("background", background);
+}
+
+template <Is<RevealParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
+    auto& [targets, keep, cut_only, keep_see_through, camera, width, height, view, plan, render] = params;
+    (void)camera, (void)width, (void)height, (void)view; // the report's camera and size say where from
+    visit("targets", targets);
+    visit("keep", keep);
+    visit("cut_only", cut_only);
+    visit("keep_see_through", keep_see_through);
+    for_each(plan, visit);
+    for_each(render, visit);
+}
+
+} // namespace porthole::fields
