@@ -4,7 +4,6 @@ namespace porthole {
 
 namespace {
 
-constexpr int kReach = 2;              ///< pixels off the tile whose lines can touch it
 constexpr int kBisections = 4;         ///< of half a pixel
 constexpr float kSuspectTurn = 0.985f; ///< cosine between neighbouring pixels' normals that asks for a closer look
 constexpr float kSuspectStep = 0.25f;  ///< the same for how far off the tangent plane, pixels
@@ -14,6 +13,15 @@ constexpr float kCreaseFrom = 0.94f, kCreaseTo = 0.766f;
 constexpr float kHiddenFrom = 0.64f, kHiddenTo = 0.34f;
 // Steps fade in between these heights, pixels.
 constexpr float kStepFrom = 0.75f, kStepTo = 2.0f;
+
+// Where so many links of a square of seven by seven points carry a line, lines fade out, those
+// without a step first: surfaces that coincide, or a grain that is finer than the picture. A
+// straight line has some ten.
+constexpr int kCrowd = 3;
+constexpr float kFlushFrom = 22, kFlushTo = 34, kStepsFrom = 36, kStepsTo = 52;
+
+/// Pixels off the tile whose lines matter to it.
+int reach_of(const LineRules& rules) { return int(std::ceil(rules.half_width + 0.5f * float(kCrowd) + 0.7f)); }
 
 float fade(float from, float to, float v) {
     const float t = clamp01((v - from) / (to - from));
@@ -58,6 +66,7 @@ struct LinePoint {
     float darkness = 0;
     bool shy = false;
     bool found = false;
+    bool flush = false; ///< the surfaces on both sides meet
 };
 
 /// Samples on a grid of half pixels; the point (i, j) lies at (i / 2, j / 2), so that pixel
@@ -65,16 +74,17 @@ struct LinePoint {
 class Lattice {
 public:
     Lattice(const View& view, Rect tile, const LineTrace& trace, const LineRules& rules)
-        : view_(view), trace_(trace), rules_(rules), tile_(tile),
-          coarse_(tile.grown(kReach + 2)), fine_{2 * coarse_.x0, 2 * coarse_.y0, 2 * coarse_.x1 + 1,
+        : view_(view), trace_(trace), rules_(rules), tile_(tile), reach_(reach_of(rules)),
+          coarse_(tile.grown(reach_ + 2)), fine_{2 * coarse_.x0, 2 * coarse_.y0, 2 * coarse_.x1 + 1,
                                                  2 * coarse_.y1 + 1},
-          samples_(fine_), known_(fine_), close_(tile.grown(kReach)), across_(fine_), down_(fine_) {}
+          samples_(fine_), known_(fine_), close_(tile.grown(reach_)), across_(fine_), down_(fine_) {}
 
     void run(const std::function<bool(int, int)>& inside, LineInk& ink) {
         look_at_pixels(inside);
         if (!find_suspects()) return;
         look_closely(inside);
         find_crossings();
+        thin_out();
         join(ink);
     }
 
@@ -221,13 +231,40 @@ private:
             c.darkness = a.part == kNoPart || b.part == kNoPart ? rules_.outline
                          : a.part != b.part                     ? rules_.part
                                                                 : 0.0f;
+            const bool step = a.part == kNoPart || b.part == kNoPart || step_px(view_, a, b) > kStepFrom;
+            c.flush = !step;
+            if (step && a.part != kNoPart && b.part != kNoPart && a.part != b.part)
+                c.darkness = std::max(c.darkness, rules_.step);
             if (a.cap != b.cap && rules_.cap > c.darkness) c.darkness = rules_.cap, c.shy = true;
         } else if (a.part != kNoPart) {
-            c.darkness =
-                std::max(rules_.step * fade(kStepFrom, kStepTo, step_px(view_, a, b)), rules_.crease * link.crease);
+            const float step = rules_.step * fade(kStepFrom, kStepTo, step_px(view_, a, b));
+            const float crease = rules_.crease * link.crease;
+            c.darkness = std::max(step, crease);
+            c.flush = crease > step;
         }
         c.found = c.darkness > 0;
         return c;
+    }
+
+    /// Fades lines where they crowd.
+    void thin_out() {
+        Image<std::uint8_t> count(fine_);
+        for (int j = fine_.y0; j < fine_.y1; ++j)
+            for (int i = fine_.x0; i < fine_.x1; ++i)
+                count(i, j) = std::uint8_t((across_(i, j).found ? 1 : 0) + (down_(i, j).found ? 1 : 0));
+        for (int j = fine_.y0; j < fine_.y1; ++j)
+            for (int i = fine_.x0; i < fine_.x1; ++i) {
+                if (count(i, j) == 0) continue;
+                int crowd = 0;
+                for (int v = j - kCrowd; v <= j + kCrowd; ++v)
+                    for (int u = i - kCrowd; u <= i + kCrowd; ++u) crowd += count.at_or(u, v, 0);
+                if (float(crowd) <= kFlushFrom) continue;
+                for (LinePoint* c : {&across_(i, j), &down_(i, j)}) {
+                    c->darkness *= 1.0f - (c->flush ? fade(kFlushFrom, kFlushTo, float(crowd))
+                                                    : fade(kStepsFrom, kStepsTo, float(crowd)));
+                    c->found = c->darkness > 0;
+                }
+            }
     }
 
     /// Joins the crossings of every cell.
@@ -268,7 +305,9 @@ private:
     const View& view_;
     const LineTrace& trace_;
     const LineRules& rules_;
-    Rect tile_, coarse_, fine_;
+    Rect tile_;
+    int reach_;
+    Rect coarse_, fine_;
     Image<LineSample> samples_;
     Mask known_;
     Mask close_;

@@ -28,8 +28,8 @@ using LineTrace = std::function<void(const Samples16& samples, LineSample* seen)
 struct LineRules {
     float half_width = 0.5f; ///< pixels
     float outline = 0;       ///< a part and the background
-    float part = 0;          ///< two parts
-    float step = 0;          ///< nearer and farther surfaces of one part
+    float part = 0;          ///< two parts that meet
+    float step = 0;          ///< nearer and farther surfaces, of one part or of two
     float crease = 0;        ///< two faces that meet at an edge
     float cap = 0;           ///< a cut surface and what is no cut surface of that part
     /// Whether a line between two samples is wanted, the nearer one first; empty: all are.
@@ -49,11 +49,12 @@ struct LineInk {
 /// bisected to 1/32 px. The crossings of each cell are joined as in marching squares, so a line is
 /// as smooth as what it follows. A change within one part counts as a step if it is still there
 /// at the end of the bisection, and fades in with its size, as creases do with their angle:
-/// no line starts or ends abruptly because of a threshold.
+/// no line starts or ends abruptly because of a threshold. Lines fade out where they crowd, as on
+/// surfaces of two parts that coincide, those without a step first.
 /// The ink depends on the rays alone, not on the tile: neighbours fit.
 ///
 /// @param tile    of the picture.
-/// @param inside  whether a pixel is looked at; asked for pixels up to 4 px off the tile.
+/// @param inside  whether a pixel is looked at; asked for pixels a few off the tile, too.
 /// Not found: things so thin that no pixel centre near them meets them.
 void find_lines(const View& view, Rect tile, const std::function<bool(int x, int y)>& inside, const LineTrace& trace,
                 const LineRules& rules, LineInk& ink);

@@ -4,10 +4,10 @@ namespace porthole {
 
 namespace {
 
-constexpr float kRimDark = 0.75f, kInnerDark = 0.5f, kLineDark = 0.3f;
-constexpr float kOutlineDark = 0.55f; ///< against the background
-constexpr float kHalfWidth = 0.5f;    ///< pixels, up to 1080 px of height
-constexpr float kBridged = 0.005f;    ///< half the gaps that the rim's line bridges, of the picture's height
+constexpr float kRimDark = 0.75f, kInnerDark = 0.5f;
+constexpr float kOutlineDark = 0.6f, kStepDark = 0.45f, kMeetDark = 0.3f;
+constexpr float kHalfWidth = 0.5f; ///< pixels, up to 1080 px of height
+constexpr float kBridged = 0.005f; ///< half the gaps that the rim's line bridges, of the picture's height
 
 /// 1 within `reach` pixels, along rows and columns, of a 1.
 Mask widened(const Mask& mask, int reach) {
@@ -35,7 +35,8 @@ LineRules line_rules(const View& view, bool all, bool caps) {
     if (caps) rules.cap = kInnerDark;
     if (all) {
         rules.outline = kOutlineDark;
-        rules.part = rules.step = rules.crease = kLineDark;
+        rules.step = kStepDark;
+        rules.part = rules.crease = kMeetDark;
     }
     return rules;
 }
