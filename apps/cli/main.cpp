@@ -160,8 +160,27 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
     add_read(app, "--depth", "Width of the band that the hole adds around targets (default 5% of the picture's height)",
              "N[px|%|mm]",
              [&o](const std::string& text, const std::string& option) { o.plan.depth = parse_length(text, option); });
-    add_choice<HoleStyle>(app, "--style", o.plan.style, {{"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
-                          "hole: straight walls; paper: as the paper builds it (default hole)");
+    add_choice<HoleStyle>(
+        app, "--style", o.plan.style,
+        {{"cutaway", HoleStyle::cutaway}, {"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
+        "cutaway: a readable window with a chamfered rim; hole: straight walls along the outline; paper: as the "
+        "paper builds it (default cutaway)");
+    add_choice<HoleShape>(app, "--shape", o.plan.shape,
+                          {{"smooth", HoleShape::smooth},
+                           {"silhouette", HoleShape::silhouette},
+                           {"hull", HoleShape::hull},
+                           {"box", HoleShape::box}},
+                          "Outline of a cutaway: the targets' own, smoothed, their convex hull or box (default smooth)");
+    add_read(app, "--bevel", "Width of a cutaway's chamfer; 0: straight walls (default: as the wall is thick)",
+             "N[px|%|mm]",
+             [&o](const std::string& text, const std::string& option) { o.plan.bevel = parse_length(text, option); });
+    app.add_option("--angle", o.plan.angle_deg,
+                   "Degrees by which a cutaway's walls lean back, all the way down, instead of a chamfer")
+        ->type_name("DEGREES")
+        ->check(CLI::Range(1.0, 89.0))
+        ->excludes("--bevel");
+    add_choice<bool>(app, "--steps", o.plan.steps, {{"auto", true}, {"off", false}},
+                     "Layers that enclose one another open in steps (default auto)");
     add_choice<ContourMethod>(
         app, "--contours", o.plan.contours,
         {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},

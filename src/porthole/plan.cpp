@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "porthole/plan_steps.h"
+
 namespace porthole {
 
 namespace {
@@ -22,13 +24,6 @@ template <typename T, typename Set> Rect bounding_rect(const Image<T>& image, Se
                 r.y0 = std::min(r.y0, y), r.y1 = std::max(r.y1, y + 1);
             }
     return r.x0 < r.x1 ? r : Rect{};
-}
-
-template <typename T> Image<T> cropped(const Image<T>& image, Rect window) {
-    if (window == image.window()) return image;
-    Image<T> out(window);
-    for (int y = window.y0; y < window.y1; ++y) std::copy_n(&image(window.x0, y), window.width(), out.row(y));
-    return out;
 }
 
 /// Pixels that the marked blocks cover.
@@ -115,17 +110,6 @@ void find_hiding_targets(std::vector<TargetView>& targets, const IdBuffer& ids) 
     }
 }
 
-/// E on `window`: background that reaches the edge of picture and margin is outside, so when
-/// some reaches the edge of `window` the whole of it has to be traced to tell.
-Mask enclosing_object(const Bvh& cut_set, const View& view, Rect window, Rect whole, const Control& control,
-                      std::int64_t& rays) {
-    Mask enclosing = fill_enclosed(trace_coverage(cut_set, view, window, control, &rays));
-    if (window == whole) return enclosing;
-    const std::vector<std::uint8_t>& pixels = enclosing.pixels();
-    if (std::find(pixels.begin(), pixels.end(), std::uint8_t{0}) == pixels.end()) return enclosing;
-    return cropped(fill_enclosed(trace_coverage(cut_set, view, whole, control, &rays)), window);
-}
-
 /// The hole as it acts on rays.
 Cut make_cut(const Subject& subject, const View& view, const Hole& hole, const IdBuffer& targets,
              std::span<const PartId> cut_set, const Bvh& cut_bvh, HoleStyle style, const Control& control,
@@ -186,8 +170,15 @@ void keep_only(IdBuffer& ids, std::span<const PartId> kept) {
     }
 }
 
+/// Parts of the plane that a plan traces.
+struct Windows {
+    Rect whole;       ///< the picture and the margin that the hole needs
+    Rect all_targets; ///< the picture and the margin in which targets shape the hole
+    Rect targets;     ///< where in it targets can be, and plan.window
+};
+
 /// Everything of the plan that depends on which targets are opened.
-void plan_opened_group(const Subject& subject, const PlanParams& params, const HoleParams& band, Rect whole,
+void plan_opened_group(const Subject& subject, const PlanParams& params, const HoleParams& band, const Windows& windows,
                        const BlockMask& blocks, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const bool all = plan.opened.size() == subject.targets.size();
@@ -195,24 +186,23 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     if (!all) some.emplace(build_bvh(*subject.meshes, plan.opened));
     const Bvh& bvh = all ? subject.target_bvh : *some;
 
-    if (params.contours == ContourMethod::full) {
-        const IdBuffer ids = trace_ids(bvh, view, whole, control, &plan.rays.targets);
-        plan.target_ids.id = cropped(ids.id, plan.window);
-        plan.target_ids.depth = cropped(ids.depth, plan.window);
-    } else {
-        plan.target_ids = trace_ids_in_blocks(bvh, view, plan.window, blocks, control, &plan.rays.targets);
-    }
-    add_thin_targets(subject, view, plan.targets, plan.opened, plan.target_ids, control, plan.rays.targets);
+    IdBuffer ids = params.contours == ContourMethod::full
+                       ? trace_ids(bvh, view, windows.all_targets, control, &plan.rays.targets)
+                       : trace_ids_in_blocks(bvh, view, windows.targets, blocks, control, &plan.rays.targets);
+    if (params.contours == ContourMethod::full) ids = cropped(ids, windows.targets);
+    add_thin_targets(subject, view, plan.targets, plan.opened, ids, control, plan.rays.targets);
 
     PaperContours paper;
     if (params.contours == ContourMethod::paper || params.style == HoleStyle::paper) paper = follow_contours(bvh, plan);
-    if (params.contours == ContourMethod::paper) {
-        keep_only(plan.target_ids, paper.ids);
+    if (params.contours == ContourMethod::paper) keep_only(ids, paper.ids);
+    plan.target_ids = cropped(ids, plan.window);
+    if (params.contours == ContourMethod::paper)
         plan.contours = paper.contours;
-    } else {
+    else
         plan.contours = find_contours(plan.target_ids.id);
-    }
     find_hiding_targets(plan.targets, plan.target_ids);
+    if (params.style == HoleStyle::cutaway)
+        return plan_cutaway(subject, params, band, windows.whole, ids, plan, control);
 
     // What lies in front of the targets is cut; the rest is loose.
     plan.spans =
@@ -220,7 +210,7 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     for (const PartSpan& span : plan.spans.parts) plan.cut_set.push_back(span.part);
     if (plan.cut_set.empty()) return;
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
-    plan.enclosing = enclosing_object(cut_bvh, view, plan.window, whole, control, plan.rays.enclosing);
+    plan.enclosing = enclosing_object(cut_bvh, view, plan.window, windows.whole, control, plan.rays.enclosing);
 
     Mask covered(plan.window, 0);
     for (std::size_t i = 0; i < covered.pixels().size(); ++i)
@@ -251,6 +241,17 @@ std::vector<PartId> no_room(const ViewPlan& plan, const PlanParams& params) {
 
 } // namespace
 
+Mask enclosing_object(const Bvh& cut_set, const View& view, Rect window, Rect whole, const Control& control,
+                      std::int64_t& rays) {
+    // Background that reaches the edge of picture and margin is outside, so when some reaches
+    // the edge of `window` the whole of it has to be traced to tell.
+    Mask enclosing = fill_enclosed(trace_coverage(cut_set, view, window, control, &rays));
+    if (window == whole) return enclosing;
+    const std::vector<std::uint8_t>& pixels = enclosing.pixels();
+    if (std::find(pixels.begin(), pixels.end(), std::uint8_t{0}) == pixels.end()) return enclosing;
+    return cropped(fill_enclosed(trace_coverage(cut_set, view, whole, control, &rays)), window);
+}
+
 Subject make_subject(const MeshBvhs& meshes, std::span<const PartId> targets, std::span<const PartId> keep,
                      std::span<const PartId> cut_only, const Control& control) {
     const Scene& scene = meshes.scene();
@@ -269,17 +270,19 @@ Subject make_subject(const MeshBvhs& meshes, std::span<const PartId> targets, st
             std::move(boxes), scene_bounds(scene)};
 }
 
+double length_px(const Subject& subject, const View& view, Length length) {
+    if (length.unit == Length::Unit::percent) return length.value / 100 * view.height;
+    if (length.unit == Length::Unit::pixel) return length.value;
+    Bounds3d box;
+    for (const PartId id : subject.targets) box.extend(part_bounds(subject.scene(), id));
+    const float z = box.empty() ? 1.0f : view.project(Vec3f(box.center())).depth;
+    return length.value / 1000 / double(view.pixel_size(std::max(z, 1e-30f)));
+}
+
 int band_depth_px(const Subject& subject, const View& view, const PlanParams& params) {
-    const Length depth =
-        params.depth.value_or(params.style == HoleStyle::paper ? Length{Length::Unit::pixel, 4} : Length{});
-    double px = depth.value;
-    if (depth.unit == Length::Unit::percent) px = depth.value / 100 * view.height;
-    if (depth.unit == Length::Unit::millimetre) {
-        Bounds3d box;
-        for (const PartId id : subject.targets) box.extend(part_bounds(subject.scene(), id));
-        const float z = box.empty() ? 1.0f : view.project(Vec3f(box.center())).depth;
-        px = depth.value / 1000 / double(view.pixel_size(std::max(z, 1e-30f)));
-    }
+    const double px =
+        length_px(subject, view,
+                  params.depth.value_or(params.style == HoleStyle::paper ? Length{Length::Unit::pixel, 4} : Length{}));
     if (!(px > 0) || !(px <= 4096))
         throw Error(ErrorKind::usage, "E0120", "--depth",
                     "the band would be " + std::to_string(px) + " px wide; it must be above 0 and at most 4096 px");
@@ -292,23 +295,29 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     plan.view = view;
     plan.depth_px = band_depth_px(subject, view, params);
     const HoleParams band{.depth_px = plan.depth_px, .blur_px = 0.025f * float(view.height)};
-    const int margin = hole_margin_px(band);
-    const Rect whole = view.window().grown(margin);
+    const CutawayMargins margins = params.style == HoleStyle::cutaway
+                                       ? cutaway_margins(view, params, band)
+                                       : CutawayMargins{hole_margin_px(band), hole_margin_px(band)};
+    Windows windows;
+    windows.whole = view.window().grown(margins.hole);
+    windows.all_targets = view.window().grown(margins.targets);
 
     // Each target alone, then all of them together.
-    const BlockMask blocks = mark_blocks(scene, subject.targets, subject.boxes, view, whole);
+    const BlockMask blocks = mark_blocks(scene, subject.targets, subject.boxes, view, windows.all_targets);
     for (const PartId id : subject.targets)
-        plan.targets.push_back(view_target(subject, view, whole, id, control, plan.rays.alone));
+        plan.targets.push_back(view_target(subject, view, windows.whole, id, control, plan.rays.alone));
     for (const TargetView& target : plan.targets)
         if (!target.absent) plan.opened.push_back(target.part);
-    const Rect touched = pixel_rect(blocks, whole);
-    plan.window = touched.empty() ? Rect{} : touched.grown(margin).intersected(whole);
+    const Rect touched = pixel_rect(blocks, windows.all_targets);
+    plan.window = touched.empty() ? Rect{} : touched.grown(margins.hole).intersected(windows.whole);
     if (plan.opened.empty()) return plan;
+    windows.targets = {std::min(touched.x0, plan.window.x0), std::min(touched.y0, plan.window.y0),
+                       std::max(touched.x1, plan.window.x1), std::max(touched.y1, plan.window.y1)};
 
     // A target that has no room is taken out of the group, and the rest is planned again:
     // what it covered may have become visible, what only it needed stays whole.
     for (;;) {
-        plan_opened_group(subject, params, band, whole, blocks, plan, control);
+        plan_opened_group(subject, params, band, windows, blocks, plan, control);
         if (params.tight == Tight::open || plan.cut_set.empty()) return plan;
         std::vector<PartId> refused = no_room(plan, params);
         if (refused.empty()) return plan;
@@ -320,6 +329,8 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
         plan.contours.clear();
         plan.cut_set.clear();
         plan.spans = {};
+        plan.core = {};
+        plan.walls.clear();
         plan.hole = {};
         plan.cut = {};
         if (plan.opened.empty()) return plan;

@@ -10,8 +10,10 @@
 
 #include "porthole/base/cut.h"
 #include "porthole/hole/hole.h"
+#include "porthole/hole/shape.h"
 #include "porthole/scene/scene.h"
 #include "porthole/trace/bvh.h"
+#include "porthole/trace/layers.h"
 #include "porthole/trace/solid.h"
 #include "porthole/trace/visibility.h"
 
@@ -24,8 +26,9 @@ enum class ContourMethod : std::uint8_t {
 };
 
 enum class HoleStyle : std::uint8_t {
-    hole, ///< straight walls, width clamped at every contour pixel
-    paper ///< N_k, P_k, F_k, one width per target, flat shading
+    cutaway, ///< countersunk: a readable window, a chamfer at the rim as wide as the wall deserves, steps
+    hole,    ///< straight walls around the targets' silhouette, width clamped at every contour pixel
+    paper    ///< N_k, P_k, F_k, one width per target, flat shading
 };
 
 enum class Tight : std::uint8_t {
@@ -41,10 +44,16 @@ struct Length {
 
 struct PlanParams {
     ContourMethod contours = ContourMethod::exact;
-    HoleStyle style = HoleStyle::hole;
-    std::optional<Length> depth; ///< width of the band; unset: 5 % (hole), 4 px (paper)
+    HoleStyle style = HoleStyle::cutaway;
+    std::optional<Length> depth; ///< width of the band; unset: 5 % (cutaway, hole), 4 px (paper)
     Tight tight = Tight::refuse;
     CapOverrides solidity; ///< parts that the user says are solids or shells
+
+    // Of style cutaway alone.
+    HoleShape shape = HoleShape::smooth;
+    std::optional<Length> bevel;     ///< width of the chamfer; 0: straight walls; unset: by the wall's thickness
+    std::optional<double> angle_deg; ///< between wall and ray, (0, 90): instead of a chamfer by thickness
+    bool steps = true;               ///< layers that enclose one another open one step after the other
 };
 
 /// What does not depend on the view: who is a target, who may be cut. Move-only; needs its
@@ -90,7 +99,10 @@ struct ViewPlan {
     Spans spans;                     ///< what lies in front of them
     std::vector<PartId> cut_set;     ///< parts that are cut, increasing
     Mask enclosing;                  ///< E
-    std::vector<Contour> contours;
+    std::vector<Contour> contours;   ///< of the targets
+    int closing_px = 0;              ///< style cutaway: radius by which the targets were closed
+    IdBuffer core;                   ///< style cutaway: M, with the nearest target pixel's part and depth
+    std::vector<LayerDepths> walls;  ///< style cutaway: first wall of each level of the cut, outside the targets
     Hole hole;                       ///< empty if nothing hides the targets
     std::vector<int> paper_depth_px; ///< style paper: k per opened target
     Cut cut;                         ///< empty if nothing is to be cut
@@ -99,6 +111,7 @@ struct ViewPlan {
 
     struct Rays {
         std::int64_t targets = 0, alone = 0, spans = 0, enclosing = 0, loose = 0;
+        std::int64_t walls = 0; ///< style cutaway
         std::int64_t paper_step1 = 0, paper_step2 = 0, caps = 0;
     } rays;
 
@@ -107,7 +120,7 @@ struct ViewPlan {
 };
 
 /// Plans the hole of one view. The same bits for any number of threads.
-/// @throws Error usage E0120 (depth out of range); Cancelled.
+/// @throws Error usage E0120 (depth, bevel or angle out of range); Cancelled.
 /// Cost: rays at the targets' pixels and around them, not a full frame; see ViewPlan::rays.
 /// Safe to call concurrently on one subject.
 [[nodiscard]] ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params = {},

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "porthole/base/error.h"
+#include "porthole/hole/blur.h"
 #include "porthole/hole/distance.h"
-#include "porthole/hole/floor.h"
 #include "porthole/hole/masks.h"
 
 namespace porthole {
@@ -43,6 +43,7 @@ void draw_discs(Hole& hole, const IdBuffer& target_ids, std::span<const PowerSit
     const auto deep = -(float(depth_px) + kRimReach);
     hole.mask = Mask(hole.window);
     hole.distance = Image<float>(hole.window);
+    hole.width = Image<float>(hole.window);
     for (std::size_t i = 0; i < targets.pixels().size(); ++i) {
         const bool inside = targets.pixels()[i] != kNoPart;
         hole.mask.pixels()[i] = inside;
@@ -63,6 +64,7 @@ void draw_discs(Hole& hole, const IdBuffer& target_ids, std::span<const PowerSit
             const Vec2i to = sites[std::size_t(site)].center - Vec2i{x, y};
             const double far_side = std::sqrt(double(dot(to, to))) + radius[std::size_t(site)];
             float& distance = hole.distance(x, y);
+            hole.width(x, y) = float(radius[std::size_t(site)]);
             if (targets(x, y) != kNoPart) {
                 distance = std::max(deep, float(-far_side));
             } else {

@@ -30,11 +30,12 @@ inline constexpr float kRimReach = 4;
 
 struct Hole {
     Rect window;
-    Rect bounds;                 ///< smallest box of the pixels inside; empty if there are none
-    Mask mask;                   ///< 1 inside: targets' pixels and band
-    Image<float> floor_depth;    ///< z(p): on the mask, metres along camera -z; the target's own depth on target
-                                 ///< pixels; +infinity elsewhere
-    Image<float> distance;       ///< signed distance to the rim in pixels, <= 0 exactly where mask = 1; see grow_hole
+    Rect bounds;              ///< smallest box of the pixels inside; empty if there are none
+    Mask mask;                ///< 1 inside: targets' pixels and band
+    Image<float> floor_depth; ///< z(p): on the mask, metres along camera -z; the target's own depth on target
+                              ///< pixels; +infinity elsewhere
+    Image<float> distance;    ///< signed distance to the rim in pixels, <= 0 exactly where mask = 1; see grow_hole
+    Image<float> width; ///< r of the disc that owns the pixel, at least 1/2, within kRimReach of a disc; 0 elsewhere
     std::vector<BandPixel> band; ///< every contour pixel once, in scan order
     [[nodiscard]] bool empty() const { return bounds.empty(); }
 };
@@ -67,7 +68,8 @@ struct Hole {
 /// -0.5 and 0.5 - sqrt(2) on those with a 4- or else 8-neighbour outside the hole.
 ///
 /// @param contours   from find_contours(targets.id).
-/// @param targets    ids and depths when only the targets are traced.
+/// @param targets    ids and depths when only the targets are traced; or of a larger core, from
+///                   fill_core: then that is what the band grows from and "target" means here.
 /// @param covered    1 at target pixels that an occluder hides; same window as `targets`.
 /// @param enclosing  E, from fill_enclosed; same window. Where it is 1 everywhere D is infinite.
 /// @return the hole in the same window; empty() if no target is in view.

@@ -30,7 +30,7 @@ std::vector<float> ring_shares(const Hole& hole, const IdBuffer& targets, const 
         const BandPixel& c = hole.band[i];
         if (!c.covered || !window.contains(c.pixel.x, c.pixel.y)) continue;
         // The floor is smoothed over the band, so the last part in a thousand does not count.
-        const float limit = targets.depth(c.pixel.x, c.pixel.y) * (1 - 1e-3f);
+        const float limit = hole.floor_depth(c.pixel.x, c.pixel.y) * (1 - 1e-3f);
         int counted = 0, clear = 0;
         for (int y = std::max(c.pixel.y - depth_px, window.y0); y <= std::min(c.pixel.y + depth_px, window.y1 - 1);
              ++y) {

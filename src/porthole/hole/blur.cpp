@@ -1,6 +1,7 @@
-#include "porthole/hole/floor.h"
+#include "porthole/hole/blur.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 namespace porthole {
@@ -21,15 +22,15 @@ struct Runs {
     }
 };
 
-/// out[i] = sum of in[i - radius] .. in[i + radius], i in [0, n), where `used`; zero beyond.
+/// out[i] = sum of value(i - radius) .. value(i + radius), i in [0, n); zero beyond.
 class RowSums {
 public:
     RowSums(Runs runs, std::int32_t n, std::int32_t origin)
         : runs_(runs), n_(n), origin_(origin), in_(padded(), 0.0), ends_(padded()), starts_(padded()) {}
 
-    void sum(const float* in, const std::uint8_t* used, double* out) {
+    template <typename Value> void sum(const Value& value, double* out) {
         double* middle = in_.data() + runs_.radius;
-        for (std::int32_t i = 0; i < n_; ++i) middle[i] = used[i] ? double(in[i]) : 0.0;
+        for (std::int32_t i = 0; i < n_; ++i) middle[i] = value(i);
 
         const std::int32_t first = origin_ - runs_.radius; // absolute position of in_[0]
         std::int32_t place = runs_.place(first);
@@ -117,7 +118,47 @@ Image<std::int32_t> square_counts(const Mask& mask, Rect box, int radius) {
     return counts;
 }
 
+/// Sums over squares of 2 radius + 1 pixels of sums over such squares, of what value(x, y) is in
+/// `read`; zero beyond. Exact to the last bit in the same way as Runs.
+template <typename Value> Image<double> sum_squares_twice(Rect read, int radius, const Value& value) {
+    const Runs runs(radius);
+    const auto width = std::size_t(read.width());
+    Image<double> sums(read), lines(read);
+    RowSums row_sums(runs, read.width(), read.x0);
+    std::vector<double> once(width);
+    for (std::int32_t y = read.y0; y < read.y1; ++y) {
+        row_sums.sum([&](std::int32_t i) { return value(read.x0 + i, y); }, once.data());
+        row_sums.sum([&](std::int32_t i) { return once[std::size_t(i)]; }, sums.row(y));
+    }
+    for (const auto& [from, to] : {std::pair{&sums, &lines}, std::pair{&lines, &sums}}) {
+        const auto read_line = [&](std::int32_t line) { return static_cast<const double*>(from->row(read.y0 + line)); };
+        const auto write_line = [&](std::int32_t line, const double* ends, const double* starts) {
+            double* out = to->row(read.y0 + line);
+            for (std::size_t x = 0; x < width; ++x) out[x] = ends[x] + starts[x];
+        };
+        sum_lines(runs, read.height(), read.y0, width, read_line, write_line);
+    }
+    return sums;
+}
+
 } // namespace
+
+void smooth_over(std::span<Image<float>> maps, const Mask& known, Rect box, int radius) {
+    // What lies farther off is not read by the box's pixels; the sums just inside this edge are
+    // too small, and not used.
+    const Rect read = box.grown(2 * radius).intersected(known.window());
+    box = box.intersected(known.window());
+    if (maps.empty() || box.empty()) return;
+    const Image<double> weights =
+        sum_squares_twice(read, radius, [&](std::int32_t x, std::int32_t y) { return known(x, y) ? 1.0 : 0.0; });
+    for (Image<float>& map : maps) {
+        const Image<double> sums = sum_squares_twice(
+            read, radius, [&](std::int32_t x, std::int32_t y) { return known(x, y) ? double(map(x, y)) : 0.0; });
+        for (std::int32_t y = box.y0; y < box.y1; ++y)
+            for (std::int32_t x = box.x0; x < box.x1; ++x)
+                map(x, y) = weights(x, y) > 0 ? float(sums(x, y) / weights(x, y)) : kInfinity;
+    }
+}
 
 Image<float> blur_floor(Image<float> depth, const Mask& mask, const Image<PartId>& targets, Rect box, int radius,
                         int times) {
@@ -136,7 +177,9 @@ Image<float> blur_floor(Image<float> depth, const Mask& mask, const Image<PartId
         const auto read_line = [&](std::int32_t line) {
             for (; ready <= line; ++ready) {
                 const std::int32_t y = read.y0 + ready;
-                row_sums.sum(depth.row(y) + (read.x0 - w.x0), mask.row(y) + (read.x0 - w.x0), row(ready));
+                const float* in = depth.row(y) + (read.x0 - w.x0);
+                const std::uint8_t* used = mask.row(y) + (read.x0 - w.x0);
+                row_sums.sum([&](std::int32_t i) { return used[i] ? double(in[i]) : 0.0; }, row(ready));
             }
             return row(line);
         };

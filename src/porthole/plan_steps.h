@@ -1,0 +1,47 @@
+// Steps of plan_view that its styles share. Not installed.
+#pragma once
+
+#include <algorithm>
+
+#include "porthole/plan.h"
+
+namespace porthole {
+
+template <typename T> Image<T> cropped(const Image<T>& image, Rect window) {
+    if (window == image.window()) return image;
+    Image<T> out(window);
+    for (int y = window.y0; y < window.y1; ++y) std::copy_n(&image(window.x0, y), window.width(), out.row(y));
+    return out;
+}
+
+inline IdBuffer cropped(const IdBuffer& ids, Rect window) {
+    IdBuffer out;
+    out.id = cropped(ids.id, window);
+    out.depth = cropped(ids.depth, window);
+    return out;
+}
+
+/// E on `window`, a part of `whole`, the picture and its margin.
+[[nodiscard]] Mask enclosing_object(const Bvh& cut_set, const View& view, Rect window, Rect whole,
+                                    const Control& control, std::int64_t& rays);
+
+/// Width in pixels of a length that users give. Not below 0.
+[[nodiscard]] double length_px(const Subject& subject, const View& view, Length length);
+
+/// How far around the picture style cutaway needs what: E, occluders and hole, and the targets.
+struct CutawayMargins {
+    int hole = 0, targets = 0;
+};
+[[nodiscard]] CutawayMargins cutaway_margins(const View& view, const PlanParams& params, const HoleParams& band);
+
+/// Closing radius that style cutaway tries first.
+[[nodiscard]] int closing_radius_px(const View& view);
+
+/// The rest of a plan of style cutaway once the targets are known: cut set, core, hole, cut.
+/// @param ids    the opened targets in the window that the closing needs, which holds plan.window;
+///               plan.target_ids, contours and spans are made.
+/// @param whole  picture and margin of the hole.
+void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& band, Rect whole,
+                  const IdBuffer& ids, ViewPlan& plan, const Control& control);
+
+} // namespace porthole
