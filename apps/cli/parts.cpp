@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "porthole/io/files.h"
-#include "porthole/scene/closed.h"
+#include "porthole/scene/solid.h"
 #include "session.h"
 
 namespace porthole::cli {
@@ -65,17 +65,26 @@ std::vector<std::string> segments_of(const std::string& path) {
 
 /// What is worth knowing of the parts beyond the scene.
 struct Facts {
-    std::vector<Closedness> closed; ///< by mesh
-    std::vector<Bounds3d> boxes;    ///< by part
+    std::vector<MeshSolid> solids; ///< by mesh
+    std::vector<Bounds3d> boxes;   ///< by part
     Bounds3d whole;
 };
 
 Facts find_facts(const Scene& scene, const Control& control) {
-    Facts facts{closedness(scene, control), std::vector<Bounds3d>(scene.parts.size()), {}};
+    Facts facts{find_solids(scene, {}, control), std::vector<Bounds3d>(scene.parts.size()), {}};
     parallel_for(scene.parts.size(), control,
                  [&](std::size_t i) { facts.boxes[i] = part_bounds(scene, PartId{std::uint32_t(i)}); });
     for (const Bounds3d& box : facts.boxes) facts.whole.extend(box);
     return facts;
+}
+
+const char* faces_of(const MeshSolid& solid) {
+    return solid.closed ? "closed" : solid.has_material() ? "partly" : "open";
+}
+
+nlohmann::ordered_json reason_of(const MeshSolid& solid) {
+    if (solid.by == ClosedBy::nothing) return nullptr;
+    return solid.by == ClosedBy::edges ? "edges" : "rays";
 }
 
 std::string table(const Scene& scene, const Facts& facts) {
@@ -108,7 +117,7 @@ std::string table(const Scene& scene, const Facts& facts) {
         // Primitives have no triangles: they are what their formulas say.
         row('#' + std::to_string(i),
             mesh.primitives.empty() ? with_commas(std::int64_t(mesh.triangles.size())) : "exact",
-            facts.closed[part.mesh].closed ? "closed" : "open", in_unit(facts.boxes[i].size(), unit),
+            faces_of(facts.solids[part.mesh]), in_unit(facts.boxes[i].size(), unit),
             joined(materials_of(scene, part), 20),
             std::string(2 * std::min<std::size_t>(above.size(), 40), ' ') + escaped(path.back()));
     }
@@ -130,18 +139,23 @@ std::string as_json(const Scene& scene, const Facts& facts) {
     Json parts = Json::array();
     for (std::size_t i = 0; i < scene.parts.size(); ++i) {
         const Part& part = scene.parts[i];
-        const Closedness& c = facts.closed[part.mesh];
+        const MeshSolid& solid = facts.solids[part.mesh];
+        const Closedness& c = solid.edges;
         const Bounds3d& box = facts.boxes[i];
-        parts.push_back({{"id", i},
-                         {"path", part.path},
-                         {"name", part.name},
-                         {"mesh", part.mesh},
-                         {"triangles", scene.meshes[part.mesh].triangles.size()},
-                         {"closed", c.closed},
-                         {"edges", {{"all", c.edges}, {"open", c.open_edges}, {"odd", c.odd_edges}}},
-                         {"size_m", numbers(box.size())},
-                         {"center_m", numbers(box.empty() ? Vec3d{} : box.center() + scene.origin)},
-                         {"materials", materials_of(scene, part)}});
+        parts.push_back(
+            {{"id", i},
+             {"path", part.path},
+             {"name", part.name},
+             {"mesh", part.mesh},
+             {"triangles", scene.meshes[part.mesh].triangles.size()},
+             {"closed", solid.closed},
+             {"by", reason_of(solid)},
+             {"components",
+              {{"all", solid.components}, {"closed", solid.closed_components}, {"flipped", solid.flipped_components}}},
+             {"edges", {{"all", c.edges}, {"open", c.open_edges}, {"odd", c.odd_edges}}},
+             {"size_m", numbers(box.size())},
+             {"center_m", numbers(box.empty() ? Vec3d{} : box.center() + scene.origin)},
+             {"materials", materials_of(scene, part)}});
     }
     j["parts"] = std::move(parts);
     j["cameras"] = Json::array();

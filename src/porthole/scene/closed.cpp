@@ -150,6 +150,7 @@ struct Spoke {
     bool forward = false;
     std::uint32_t copy = 0; ///< how many equal triangles come before it
     double angle = 0;       ///< counter-clockwise about the edge, looking from upper to lower
+    bool repeated = false;  ///< another triangle has the same corners, in whatever order
     bool matched = false;
 };
 
@@ -211,14 +212,16 @@ std::vector<Spoke> spokes_of(const Mesh& mesh, const Edges& edges, const OddEdge
         for (const std::uint32_t corner : {edges.vertex[t.y], edges.vertex[t.z]})
             if (third == edge.lower || third == edge.upper) third = corner;
         const Vec3d d = Vec3d(mesh.positions[third]) - origin;
-        spokes.push_back({triangle, third, edges.half_edges[h].forward(), 0, std::atan2(dot(d, v), dot(d, u)), false});
+        spokes.push_back({triangle, third, edges.half_edges[h].forward(), 0, std::atan2(dot(d, v), dot(d, u))});
     }
     std::sort(spokes.begin(), spokes.end(), [](const Spoke& a, const Spoke& b) {
-        return std::tuple(a.forward, a.third, a.triangle) < std::tuple(b.forward, b.third, b.triangle);
+        return std::tuple(a.third, a.forward, a.triangle) < std::tuple(b.third, b.forward, b.triangle);
     });
-    for (std::size_t i = 1; i < spokes.size(); ++i)
-        if (spokes[i].forward == spokes[i - 1].forward && spokes[i].third == spokes[i - 1].third)
-            spokes[i].copy = spokes[i - 1].copy + 1;
+    for (std::size_t i = 1; i < spokes.size(); ++i) {
+        if (spokes[i].third != spokes[i - 1].third) continue;
+        spokes[i].repeated = spokes[i - 1].repeated = true;
+        if (spokes[i].forward == spokes[i - 1].forward) spokes[i].copy = spokes[i - 1].copy + 1;
+    }
     return spokes;
 }
 
@@ -261,11 +264,11 @@ Pieces find_pieces(const Mesh& mesh) {
     DisjointSets sets(n);
     const Edges edges = pair_edges(mesh, sets);
 
-    std::vector<std::uint8_t> open, copy; // by triangle, where there are odd edges at all
+    std::vector<std::uint8_t> open, repeated; // by triangle, where there are odd edges at all
     if (!edges.odd.empty()) {
         open = find_dead_patches(edges, sets, n);
         for (std::uint32_t t = 0; t < n; ++t) open[t] = open[sets.find(t)];
-        copy.assign(n, 0);
+        repeated.assign(n, 0);
         // The patches stay as they are while edges are matched: `sets` is their union.
         DisjointSets patches = sets;
         std::vector<std::uint8_t> dead = open;
@@ -274,7 +277,7 @@ Pieces find_pieces(const Mesh& mesh) {
             match_spokes(spokes, [&](const Spoke& a, const Spoke& b) { sets.unite(a.triangle, b.triangle); });
             for (const Spoke& spoke : spokes) {
                 if (!spoke.matched) open[spoke.triangle] = 1;
-                if (spoke.copy > 0) copy[spoke.triangle] = 1;
+                if (spoke.repeated) repeated[spoke.triangle] = 1;
             }
             // What hangs on an open edge is counted as one open piece.
             std::uint32_t first = kNoPiece;
@@ -309,7 +312,7 @@ Pieces find_pieces(const Mesh& mesh) {
             const std::uint32_t piece = out.of_triangle[t];
             if (piece == kNoPiece) continue;
             if (open[t]) out.kind[piece] = PieceKind::open;
-            if (!copy[t]) all_copies[piece] = 0;
+            if (!repeated[t]) all_copies[piece] = 0;
         }
         for (std::size_t i = 0; i < out.kind.size(); ++i)
             if (out.kind[i] == PieceKind::open && all_copies[i]) out.kind[i] = PieceKind::duplicate;

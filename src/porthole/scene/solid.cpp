@@ -17,9 +17,6 @@ constexpr std::uint64_t kPairsPerTriangle = 32, kLeastPairs = 20'000'000;
 constexpr std::size_t kMostSamples = 200'000; ///< points that nesting looks at
 constexpr std::size_t kSamplesPerPiece = 7;
 constexpr std::uint32_t kNoTriangle = 0xFFFFFFFFu;
-/// Volume over area and diagonal under which a piece is a flat sheet: float coordinates hold
-/// no more.
-constexpr double kFlat = 1e-6;
 
 std::uint64_t pair_budget(const Mesh& mesh) {
     return std::max(kLeastPairs, kPairsPerTriangle * std::uint64_t(mesh.triangles.size()));
@@ -48,10 +45,18 @@ struct Measures {
         std::fill(std::begin(sample), std::end(sample), kNoTriangle);
         std::fill(std::begin(reach), std::end(reach), -std::numeric_limits<double>::infinity());
     }
-    [[nodiscard]] bool flat() const { return !(std::abs(volume) > kFlat * area * box.diagonal()); }
     void offer(std::size_t slot, double value, std::uint32_t triangle) {
         if (value > reach[slot]) reach[slot] = value, sample[slot] = triangle;
     }
+    /// A length under which float coordinates of this size hold nothing, metres.
+    [[nodiscard]] double least_length() const {
+        const double largest = std::max(length(box.lower), length(box.upper));
+        return std::max(1e-6 * box.diagonal(), 4e-7 * largest);
+    }
+    /// A closed piece without room inside.
+    [[nodiscard]] bool flat() const { return sample[0] == kNoTriangle || !(std::abs(volume) > least_length() * area); }
+    /// An open piece that no ray meets.
+    [[nodiscard]] bool needle() const { return !(area > least_length() * box.diagonal()); }
 };
 
 std::vector<Measures> measure(const Mesh& mesh, const Pieces& pieces) {
@@ -78,7 +83,15 @@ std::vector<Measures> measure(const Mesh& mesh, const Pieces& pieces) {
     return out;
 }
 
-/// A point in the material of a closed piece, next to the triangle of a sample slot.
+/// What find_solid() makes of the pieces.
+enum class Role : std::uint8_t {
+    bounding, ///< closed, with a volume inside
+    open,
+    ignored ///< bounds nothing and opens nothing: copies, flat sheets, needles
+};
+
+/// A point just outside a closed piece, next to the triangle of a sample slot: outside, so that
+/// of pieces that touch or coincide none lies in the other.
 Vec3d sample_point(const Mesh& mesh, const Measures& m, std::size_t slot) {
     const Corners t = corners_of(mesh, m.sample[slot]);
     Vec3d p = (t.a + t.b + t.c) * (1.0 / 3);
@@ -89,71 +102,96 @@ Vec3d sample_point(const Mesh& mesh, const Measures& m, std::size_t slot) {
             std::max({t.a, t.b, t.c}, [&](const Vec3d& l, const Vec3d& r) { return sign * l[axis] < sign * r[axis]; });
         p = lerp(p, farthest, 0.6);
     }
-    const double largest = std::max(length(m.box.lower), length(m.box.upper));
-    const double step = std::max(1e-5 * m.box.diagonal(), 4e-7 * largest);
-    return p - normalize(t.normal()) * std::copysign(step, m.volume);
+    return p + normalize(t.normal()) * std::copysign(5 * m.least_length(), m.volume);
 }
 
-/// How many other closed pieces each closed piece lies in, by piece; nothing if that is too
-/// much work.
-std::optional<std::vector<std::uint32_t>> find_nesting(const Mesh& mesh, const Pieces& pieces,
-                                                       const std::vector<Measures>& measures,
-                                                       const std::vector<std::uint8_t>& bounding) {
-    std::vector<std::uint32_t> depth(pieces.kind.size(), 0);
-    const auto several = std::size_t(std::ranges::count(bounding, 1));
-    if (several < 2) return depth;
-    if (several > kMostSamples) return std::nullopt;
-    const std::size_t slots = std::clamp<std::size_t>(kMostSamples / several, 1, kSamplesPerPiece);
-
-    std::vector<Vec3d> points;
-    std::vector<std::uint32_t> piece_of_point;
-    for (std::uint32_t i = 0; i < measures.size(); ++i)
-        for (std::size_t slot = 0; bounding[i] && slot < slots; ++slot) {
-            points.push_back(sample_point(mesh, measures[i], slot));
-            piece_of_point.push_back(i);
-        }
-    std::vector<std::uint8_t> wanted(mesh.triangles.size(), 0);
-    for (std::size_t t = 0; t < wanted.size(); ++t)
-        if (pieces.of_triangle[t] != kNoPiece) wanted[t] = bounding[pieces.of_triangle[t]];
-    const auto piercings = find_piercings(mesh, wanted, {1, 0, 0}, points, pair_budget(mesh));
+/// Around each point the labels whose triangles enclose it: those that the half line from it
+/// leaves more or less often than it enters them. Nothing if that is too much work.
+/// @param label  by triangle; kNoPiece: not looked at.
+std::optional<std::vector<std::vector<std::uint32_t>>> find_enclosing(const Mesh& mesh,
+                                                                      const std::vector<std::uint32_t>& label,
+                                                                      std::span<const Vec3d> points, Vec3d direction) {
+    std::vector<std::uint8_t> wanted(label.size());
+    std::ranges::transform(label, wanted.begin(), [](std::uint32_t l) { return std::uint8_t(l != kNoPiece); });
+    const auto piercings = find_piercings(mesh, wanted, direction, points, pair_budget(mesh));
     if (!piercings) return std::nullopt;
 
-    // The pieces around the points of each piece: those that the half line from it leaves more
-    // or less often than it enters them. A piece lies in another if all its points do.
-    std::vector<std::uint32_t> around;
-    std::vector<std::pair<std::uint32_t, int>> crossed; // of one line: piece, sign
-    const auto count_runs = [](auto first, auto last, auto&& body) {
-        for (auto run = first; run != last;) {
-            auto end = run;
-            while (end != last && *end == *run) ++end;
-            body(*run, std::size_t(end - run));
+    std::vector<std::vector<std::uint32_t>> out(points.size());
+    std::vector<std::pair<std::uint32_t, int>> crossed; // label, sign
+    for (std::size_t i = 0; i < piercings->size();) {
+        const std::uint32_t line = (*piercings)[i].line;
+        crossed.clear();
+        for (; i < piercings->size() && (*piercings)[i].line == line; ++i) {
+            const Piercing& p = (*piercings)[i];
+            if (p.along > 0) crossed.emplace_back(label[p.triangle], p.entering ? -1 : 1);
+        }
+        std::ranges::sort(crossed);
+        for (std::size_t k = 0; k < crossed.size();) {
+            const std::uint32_t l = crossed[k].first;
+            int winding = 0;
+            for (; k < crossed.size() && crossed[k].first == l; ++k) winding += crossed[k].second;
+            if (winding != 0) out[line].push_back(l);
+        }
+    }
+    return out;
+}
+
+/// Sample points of the chosen pieces, one piece after the other.
+struct Samples {
+    std::vector<Vec3d> points;
+    std::vector<std::uint32_t> piece; ///< by point
+};
+
+/// @return nothing if there are more pieces than points to look at.
+std::optional<Samples> take_samples(const Mesh& mesh, const std::vector<Measures>& measures,
+                                    const std::vector<std::uint32_t>& chosen) {
+    if (chosen.size() > kMostSamples) return std::nullopt;
+    const std::size_t slots =
+        std::clamp<std::size_t>(kMostSamples / std::max<std::size_t>(1, chosen.size()), 1, kSamplesPerPiece);
+    Samples out;
+    for (const std::uint32_t i : chosen)
+        for (std::size_t slot = 0; slot < slots; ++slot) {
+            out.points.push_back(sample_point(mesh, measures[i], slot));
+            out.piece.push_back(i);
+        }
+    return out;
+}
+
+/// By triangle its piece, if that bounds a volume.
+std::vector<std::uint32_t> bounding_labels(const Pieces& pieces, const std::vector<Role>& role) {
+    std::vector<std::uint32_t> label = pieces.of_triangle;
+    for (std::uint32_t& l : label)
+        if (l != kNoPiece && role[l] != Role::bounding) l = kNoPiece;
+    return label;
+}
+
+/// How many other bounding pieces each of them lies in, by piece; nothing if that is too much
+/// work. A piece lies in another if all its samples do.
+std::optional<std::vector<std::uint32_t>> find_nesting(const Mesh& mesh, const Pieces& pieces,
+                                                       const std::vector<Measures>& measures,
+                                                       const std::vector<Role>& role) {
+    std::vector<std::uint32_t> depth(role.size(), 0), chosen;
+    for (std::uint32_t i = 0; i < role.size(); ++i)
+        if (role[i] == Role::bounding) chosen.push_back(i);
+    if (chosen.size() < 2) return depth;
+    const std::optional<Samples> samples = take_samples(mesh, measures, chosen);
+    if (!samples) return std::nullopt;
+    const auto enclosing = find_enclosing(mesh, bounding_labels(pieces, role), samples->points, {1, 0, 0});
+    if (!enclosing) return std::nullopt;
+
+    std::vector<std::uint32_t> around; // all samples of one piece
+    for (std::size_t i = 0; i < samples->points.size();) {
+        const std::uint32_t piece = samples->piece[i];
+        around.clear();
+        std::ptrdiff_t own = 0;
+        for (; i < samples->points.size() && samples->piece[i] == piece; ++i, ++own)
+            around.insert(around.end(), (*enclosing)[i].begin(), (*enclosing)[i].end());
+        std::ranges::sort(around);
+        for (auto run = around.begin(); run != around.end();) {
+            const auto end = std::find_if(run, around.end(), [&](std::uint32_t l) { return l != *run; });
+            if (*run != piece && end - run == own) ++depth[piece];
             run = end;
         }
-    };
-    for (std::size_t line = 0, i = 0; line < points.size();) {
-        const std::uint32_t piece = piece_of_point[line];
-        around.clear();
-        std::size_t own_points = 0;
-        for (; line < points.size() && piece_of_point[line] == piece; ++line, ++own_points) {
-            crossed.clear();
-            for (; i < piercings->size() && (*piercings)[i].line == line; ++i) {
-                const Piercing& p = (*piercings)[i];
-                if (p.along > 0) crossed.emplace_back(pieces.of_triangle[p.triangle], p.entering ? -1 : 1);
-            }
-            std::ranges::sort(crossed);
-            for (std::size_t k = 0; k < crossed.size();) {
-                const std::uint32_t other = crossed[k].first;
-                int winding = 0;
-                for (; k < crossed.size() && crossed[k].first == other; ++k) winding += crossed[k].second;
-                if (winding != 0) around.push_back(other);
-            }
-        }
-        std::ranges::sort(around);
-        count_runs(around.begin(), around.end(), [&](std::uint32_t other, std::size_t times) {
-            // Copies of a piece are as large as it is, and none lies in the other.
-            const bool larger = std::abs(measures[other].volume) > (1 + 1e-5) * std::abs(measures[piece].volume);
-            if (other != piece && larger && times == own_points) ++depth[piece];
-        });
     }
     return depth;
 }
@@ -191,44 +229,61 @@ void count_line(std::span<const Piercing> line, double same_place, Balance& out)
     out.single_turned += highest == 0 && lowest >= -1;
 }
 
+/// What lines through points of the open pieces say.
 struct RayTest {
-    Balance open, whole; ///< of the open pieces alone, and of all that are not copies or flat
+    Balance open, whole; ///< of the open pieces alone, and of the bounding ones with them
+    double within = 0;   ///< share of the points that lie in an odd number of bounding pieces
 };
 
-/// @param open   by triangle: 1 if edges leave it open; lines go through points of those.
-/// @param whole  by triangle: 1 if it counts at all.
-std::optional<RayTest> test_by_rays(const Mesh& mesh, const std::vector<std::uint8_t>& open,
-                                    const std::vector<std::uint8_t>& whole) {
+/// A point of the surface and the normal there, by the winding.
+struct SurfacePoint {
+    Vec3d position, normal;
+};
+
+/// kTestLines points spread evenly over the chosen triangles; fewer only if those have no area.
+template <typename Random>
+std::vector<SurfacePoint> spread_points(const Mesh& mesh, const std::vector<std::uint8_t>& chosen, Random&& unit) {
     double area = 0;
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i)
-        if (open[i]) area += length(corners_of(mesh, i).normal());
-    if (!(area > 0) || !std::isfinite(area)) return std::nullopt;
-
-    std::mt19937 random(20261122);
-    const auto unit = [&] { return (double(random()) + 0.5) * 0x1p-32; };
-    // Points spread evenly over the surface.
-    std::vector<Vec3d> points[kTestDirections];
-    double below = 0;
-    std::uint32_t taken = 0;
-    double next = unit() / kTestLines * area;
-    for (std::uint32_t i = 0; i < mesh.triangles.size() && taken < kTestLines; ++i) {
-        if (!open[i]) continue;
+        if (chosen[i]) area += length(corners_of(mesh, i).normal());
+    std::vector<SurfacePoint> out;
+    if (!(area > 0) || !std::isfinite(area)) return out;
+    double below = 0, next = unit() / kTestLines * area;
+    for (std::uint32_t i = 0; i < mesh.triangles.size() && out.size() < kTestLines; ++i) {
+        if (!chosen[i]) continue;
         const Corners t = corners_of(mesh, i);
         below += length(t.normal());
-        while (taken < kTestLines && next < below) {
+        while (out.size() < kTestLines && next < below) {
             const double s = std::sqrt(unit()), r = unit();
-            points[taken % kTestDirections].push_back(t.a * (1 - s) + t.b * (s * (1 - r)) + t.c * (s * r));
-            next = (++taken + unit()) / kTestLines * area;
+            out.push_back({t.a * (1 - s) + t.b * (s * (1 - r)) + t.c * (s * r), normalize(t.normal())});
+            next = (double(out.size()) + unit()) / kTestLines * area;
         }
     }
+    return out;
+}
+
+std::optional<RayTest> test_by_rays(const Mesh& mesh, const Pieces& pieces, const std::vector<Role>& role) {
+    std::vector<std::uint8_t> open(mesh.triangles.size(), 0), whole(mesh.triangles.size(), 0);
+    for (std::size_t t = 0; t < open.size(); ++t) {
+        const std::uint32_t piece = pieces.of_triangle[t];
+        if (piece == kNoPiece) continue;
+        open[t] = role[piece] == Role::open;
+        whole[t] = role[piece] != Role::ignored;
+    }
+    std::mt19937 random(20261122);
+    const auto unit = [&] { return (double(random()) + 0.5) * 0x1p-32; };
+    const std::vector<SurfacePoint> points = spread_points(mesh, open, unit);
 
     RayTest out;
     const double same_place = 1e-6 * mesh.bounds.diagonal();
+    std::vector<Vec3d> through;
     std::vector<Piercing> part;
-    for (std::vector<Vec3d>& through : points) {
+    for (std::size_t d = 0; d < kTestDirections; ++d) {
         Vec3d direction;
         do direction = Vec3d{unit(), unit(), unit()} * 2.0 - Vec3d{1, 1, 1};
         while (dot(direction, direction) > 1 || dot(direction, direction) < 0.01);
+        through.clear();
+        for (std::size_t i = d; i < points.size(); i += kTestDirections) through.push_back(points[i].position);
         const auto piercings = find_piercings(mesh, whole, normalize(direction), through, pair_budget(mesh));
         if (!piercings) return std::nullopt;
         for (std::size_t begin = 0; begin < piercings->size();) {
@@ -241,7 +296,41 @@ std::optional<RayTest> test_by_rays(const Mesh& mesh, const std::vector<std::uin
             begin = end;
         }
     }
+
+    if (std::ranges::find(role, Role::bounding) != role.end()) {
+        through.clear();
+        for (const SurfacePoint& p : points) through.push_back(p.position + p.normal * (5 * same_place));
+        const auto enclosing = find_enclosing(mesh, bounding_labels(pieces, role), through, {1, 0, 0});
+        if (!enclosing) return std::nullopt;
+        const auto odd = std::ranges::count_if(*enclosing, [](const auto& around) { return around.size() % 2 == 1; });
+        out.within = double(odd) / double(points.size());
+    }
     return out;
+}
+
+/// Which bounding pieces lie within the open ones taken together, by piece: all their samples
+/// do, in most of three directions. Nothing if that is too much work.
+std::optional<std::vector<std::uint8_t>> find_within_open(const Mesh& mesh, const Pieces& pieces,
+                                                          const std::vector<Measures>& measures,
+                                                          const std::vector<Role>& role,
+                                                          const std::vector<std::uint32_t>& chosen) {
+    std::vector<std::uint8_t> within(role.size(), 0);
+    if (chosen.empty()) return within;
+    const std::optional<Samples> samples = take_samples(mesh, measures, chosen);
+    if (!samples) return std::nullopt;
+    std::vector<std::uint32_t> label = pieces.of_triangle;
+    for (std::uint32_t& l : label)
+        if (l != kNoPiece) l = role[l] == Role::open ? 0 : kNoPiece;
+    std::vector<int> votes(samples->points.size(), 0);
+    for (const Vec3d direction : {Vec3d{0.61, 0.74, 0.28}, Vec3d{-0.81, 0.29, 0.51}, Vec3d{0.19, -0.62, 0.76}}) {
+        const auto enclosing = find_enclosing(mesh, label, samples->points, normalize(direction));
+        if (!enclosing) return std::nullopt;
+        for (std::size_t i = 0; i < votes.size(); ++i) votes[i] += !(*enclosing)[i].empty();
+    }
+    for (const std::uint32_t piece : chosen) within[piece] = 1;
+    for (std::size_t i = 0; i < votes.size(); ++i)
+        if (votes[i] < 2) within[samples->piece[i]] = 0;
+    return within;
 }
 
 bool lies_in(const Bounds3d& inner, const Bounds3d& outer) {
@@ -250,53 +339,55 @@ bool lies_in(const Bounds3d& inner, const Bounds3d& outer) {
     return true;
 }
 
-/// Judges the pieces that edges leave open, and those they close beside them.
-/// @param side  by piece; in: closed ones by nesting, open ones open. Out: all.
-void judge_open_pieces(const Mesh& mesh, const Pieces& pieces, const std::vector<Measures>& measures,
-                       std::vector<TriangleSide>& side, MeshSolid& out) {
-    Bounds3d open_box;
-    for (std::size_t i = 0; i < side.size(); ++i)
-        if (pieces.kind[i] == PieceKind::open) open_box.extend(measures[i].box);
-    std::vector<std::uint8_t> open(mesh.triangles.size(), 0), whole(mesh.triangles.size(), 0);
-    for (std::size_t t = 0; t < open.size(); ++t) {
-        const std::uint32_t piece = pieces.of_triangle[t];
-        if (piece == kNoPiece) continue;
-        open[t] = pieces.kind[piece] == PieceKind::open;
-        whole[t] = open[t] || side[piece] != TriangleSide::open;
-    }
-    const std::optional<RayTest> test = test_by_rays(mesh, open, whole);
-    const bool mixed = std::ranges::any_of(side, [](TriangleSide s) { return s != TriangleSide::open; });
-    const auto set = [&](TriangleSide value, auto&& choose) {
-        for (std::size_t i = 0; i < side.size(); ++i)
-            if (choose(i)) side[i] = value;
-    };
-    const auto is_open = [&](std::size_t i) { return pieces.kind[i] == PieceKind::open; };
+TriangleSide turned(TriangleSide side) {
+    return side == TriangleSide::open      ? side
+           : side == TriangleSide::outward ? TriangleSide::inward
+                                           : TriangleSide::outward;
+}
 
-    if (test && mixed) {
-        const Balance& b = test->whole;
-        const bool wound = nearly_all(b.single_wound, b.lines), turned = nearly_all(b.single_turned, b.lines);
-        if (wound || turned) {
-            out.lines = b.lines, out.balanced_lines = wound ? b.single_wound : b.single_turned;
-            set(wound ? TriangleSide::outward : TriangleSide::inward,
-                [&](std::size_t i) { return is_open(i) || side[i] != TriangleSide::open; });
-            out.by = ClosedBy::rays;
+/// Judges the pieces that edges leave open, and those they close beside them.
+/// @param side  by piece; in: bounding ones by nesting, others open. Out: all.
+void judge_open_pieces(const Mesh& mesh, const Pieces& pieces, const std::vector<Measures>& measures,
+                       const std::vector<Role>& role, std::vector<TriangleSide>& side, MeshSolid& out) {
+    Bounds3d open_box;
+    for (std::size_t i = 0; i < role.size(); ++i)
+        if (role[i] == Role::open) open_box.extend(measures[i].box);
+    std::vector<std::uint32_t> in_box; // bounding pieces that the open ones may enclose
+    bool mixed = false;
+    for (std::uint32_t i = 0; i < role.size(); ++i) {
+        if (side[i] == TriangleSide::open) continue;
+        mixed = true;
+        if (lies_in(measures[i].box, open_box)) in_box.push_back(i);
+    }
+    const std::optional<RayTest> test = test_by_rays(mesh, pieces, role);
+    const auto close = [&](const Balance& balance, std::uint32_t wound, std::uint32_t turned_around) {
+        out.lines = balance.lines, out.balanced_lines = std::max(wound, turned_around);
+        if (!nearly_all(out.balanced_lines, out.lines)) return false;
+        out.by = ClosedBy::rays;
+        return true;
+    };
+
+    // The winding of the file makes sense of the whole.
+    if (test && mixed && close(test->whole, test->whole.single_wound, test->whole.single_turned)) {
+        const bool wound = test->whole.single_wound >= test->whole.single_turned;
+        for (std::size_t i = 0; i < role.size(); ++i)
+            if (role[i] != Role::ignored) side[i] = wound ? TriangleSide::outward : TriangleSide::inward;
+        return;
+    }
+    // The open pieces make sense by themselves, wholly inside or outside the material of the others.
+    const bool apart = test && (test->within <= 0.02 || test->within >= 0.98);
+    if (test && close(test->open, test->open.as_wound, test->open.turned) && apart) {
+        if (const auto within = find_within_open(mesh, pieces, measures, role, in_box)) {
+            const bool wound = test->open.as_wound >= test->open.turned, cavity = test->within > 0.5;
+            for (std::size_t i = 0; i < role.size(); ++i) {
+                if (role[i] == Role::open) side[i] = wound != cavity ? TriangleSide::outward : TriangleSide::inward;
+                if ((*within)[i]) side[i] = turned(side[i]);
+            }
             return;
         }
     }
-    if (test) {
-        const Balance& b = test->open;
-        out.lines = b.lines, out.balanced_lines = std::max(b.as_wound, b.turned);
-        bool nested = false;
-        for (std::size_t i = 0; i < side.size(); ++i)
-            if (side[i] != TriangleSide::open)
-                nested |= lies_in(measures[i].box, open_box) || lies_in(open_box, measures[i].box);
-        if (nearly_all(out.balanced_lines, b.lines) && !nested) {
-            set(b.as_wound >= b.turned ? TriangleSide::outward : TriangleSide::inward, is_open);
-            out.by = ClosedBy::rays;
-            return;
-        }
-    }
-    set(TriangleSide::open, [&](std::size_t i) { return lies_in(measures[i].box, open_box); });
+    out.by = ClosedBy::nothing;
+    for (const std::uint32_t i : in_box) side[i] = TriangleSide::open;
 }
 
 } // namespace
@@ -313,25 +404,24 @@ MeshSolid find_solid(const Mesh& mesh) {
     const Pieces pieces = find_pieces(mesh);
     const std::size_t count = pieces.kind.size();
     const std::vector<Measures> measures = measure(mesh, pieces);
+    std::vector<Role> role(count, Role::ignored);
+    for (std::size_t i = 0; i < count; ++i) {
+        if (pieces.kind[i] == PieceKind::closed && !measures[i].flat()) role[i] = Role::bounding;
+        if (pieces.kind[i] == PieceKind::open && !measures[i].needle()) role[i] = Role::open;
+    }
+
     MeshSolid out;
     out.edges = pieces.edges;
-
-    std::vector<std::uint8_t> bounding(count, 0); // closed pieces that hold a volume
-    for (std::size_t i = 0; i < count; ++i)
-        bounding[i] =
-            pieces.kind[i] == PieceKind::closed && !measures[i].flat() && measures[i].sample[0] != kNoTriangle;
-
     std::vector<TriangleSide> side(count, TriangleSide::open);
-    if (const auto depth = find_nesting(mesh, pieces, measures, bounding))
+    if (const auto depth = find_nesting(mesh, pieces, measures, role))
         for (std::size_t i = 0; i < count; ++i)
-            if (bounding[i])
+            if (role[i] == Role::bounding)
                 side[i] =
                     (measures[i].volume > 0) == ((*depth)[i] % 2 == 0) ? TriangleSide::outward : TriangleSide::inward;
-    if (std::ranges::find(pieces.kind, PieceKind::open) != pieces.kind.end())
-        judge_open_pieces(mesh, pieces, measures, side, out);
+    if (std::ranges::find(role, Role::open) != role.end()) judge_open_pieces(mesh, pieces, measures, role, side, out);
 
     for (std::size_t i = 0; i < count; ++i) {
-        if (pieces.kind[i] == PieceKind::duplicate) continue;
+        if (role[i] == Role::ignored) continue;
         ++out.components;
         out.closed_components += side[i] != TriangleSide::open;
         out.flipped_components += side[i] == TriangleSide::inward;
@@ -342,8 +432,7 @@ MeshSolid find_solid(const Mesh& mesh) {
     else if (out.by != ClosedBy::rays)
         out.by = ClosedBy::edges;
 
-    const bool alike = std::ranges::adjacent_find(side, std::not_equal_to{}) == side.end();
-    if (alike) {
+    if (std::ranges::adjacent_find(side, std::not_equal_to{}) == side.end()) {
         if (!side.empty()) out.uniform = side[0];
     } else {
         out.side.resize(mesh.triangles.size(), TriangleSide::open);
