@@ -18,8 +18,18 @@ inline const char* name_of(ContourMethod method) {
 }
 inline const char* name_of(HoleStyle style) {
     switch (style) {
+    case HoleStyle::cutaway: return "cutaway";
     case HoleStyle::hole: return "hole";
     case HoleStyle::paper: return "paper";
+    }
+    return nullptr;
+}
+inline const char* name_of(HoleShape shape) {
+    switch (shape) {
+    case HoleShape::silhouette: return "silhouette";
+    case HoleShape::smooth: return "smooth";
+    case HoleShape::hull: return "hull";
+    case HoleShape::box: return "box";
     }
     return nullptr;
 }
@@ -78,13 +88,17 @@ concept Is = std::is_same_v<std::remove_const_t<T>, Params>;
 // bindings are there so that a new field does not compile until it has a name here.
 
 template <Is<PlanParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
-    auto& [contours, style, depth, tight, solidity] = params;
+    auto& [contours, style, depth, tight, solidity, shape, bevel, angle_deg, steps] = params;
     visit("contours", contours);
     visit("style", style);
     visit("depth", depth);
     visit("tight", tight);
     visit("solid", solidity.solid);
     visit("shell", solidity.shell);
+    visit("shape", shape);
+    visit("bevel", bevel);
+    visit("angle_deg", angle_deg);
+    visit("steps", steps);
 }
 
 template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& visit) {

@@ -36,6 +36,7 @@ struct FieldWriter {
     Json json(const std::optional<Length>& v) const {
         return v ? Json{v->value, fields::name_of(v->unit)} : Json(nullptr);
     }
+    Json json(const std::optional<double>& v) const { return v ? Json(*v) : Json(nullptr); }
     Json json(const std::vector<PartId>& ids) const {
         Json parts = Json::array();
         for (const PartId id : ids) {

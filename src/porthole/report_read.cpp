@@ -116,6 +116,10 @@ struct FieldReader {
         if (node.size() != 2) node.refuse("a number and a unit");
         v = Length{node.at(1).choice<Length::Unit>(), node.at(0).number(0, 1e300)};
     }
+    static void read(const Node& node, std::optional<double>& v) {
+        v.reset();
+        if (!node.is_null()) v = node.number(-1e300, 1e300);
+    }
     void read(const Node& node, std::vector<PartId>& v) const {
         v.clear();
         for (std::size_t i = 0; i < node.size(); ++i) {
