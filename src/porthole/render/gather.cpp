@@ -53,7 +53,6 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
         Pixel& pixel = buffer.pixels(x, y);
         if (seen.in_hole[i]) pixel.flags |= Pixel::in_hole;
         if (seen.on_target[i]) pixel.flags |= Pixel::on_target;
-        if (seen.on_rim[i]) pixel.flags |= Pixel::on_rim;
         const Hit& hit = seen.hit[i];
         buffer.ids.id(x, y) = hit.part;
         buffer.ids.depth(x, y) = seen.depth[i];

@@ -190,6 +190,7 @@ private:
             for (int step = 0; step < kBisections; ++step) bisect(std::span(links.data() + begin, n));
         }
         for (const Link& link : links) {
+            if (same_thing(link.a, link.b) && link.a.part == kNoPart) continue;
             const float t = 0.5f * (link.ta + link.tb);
             LinePoint& c = (link.is_across ? across_ : down_)(link.point.x, link.point.y);
             c = weigh(link);
@@ -227,21 +228,24 @@ private:
         LinePoint c;
         if (a.masked || b.masked) return c;
         if (rules_.wanted && !rules_.wanted(nearer, farther)) return c;
-        if (!same_thing(a, b)) {
-            c.darkness = a.part == kNoPart || b.part == kNoPart ? rules_.outline
-                         : a.part != b.part                     ? rules_.part
-                                                                : 0.0f;
-            const bool step = a.part == kNoPart || b.part == kNoPart || step_px(view_, a, b) > kStepFrom;
-            c.flush = !step;
-            if (step && a.part != kNoPart && b.part != kNoPart && a.part != b.part)
-                c.darkness = std::max(c.darkness, rules_.step);
-            if (a.cap != b.cap && rules_.cap > c.darkness) c.darkness = rules_.cap, c.shy = true;
-        } else if (a.part != kNoPart) {
-            const float step = rules_.step * fade(kStepFrom, kStepTo, step_px(view_, a, b));
-            const float crease = rules_.crease * link.crease;
-            c.darkness = std::max(step, crease);
-            c.flush = crease > step;
+        const bool background = a.part == kNoPart || b.part == kNoPart;
+        const float step = background ? 1.0f : fade(kStepFrom, kStepTo, step_px(view_, a, b));
+        float crease = 0;
+        if (same_thing(a, b)) {
+            crease = link.crease;
+            c.darkness = std::max(rules_.step * step, rules_.crease * crease);
+        } else if (background) {
+            c.darkness = rules_.outline;
+        } else if (a.part != b.part) {
+            c.darkness = std::max(rules_.part, rules_.step * step);
         }
+        if (a.cap || b.cap) {
+            const float cap = a.cap != b.cap     ? rules_.cap
+                              : a.part != b.part ? std::max(rules_.cap_part, rules_.cap * step)
+                                                 : rules_.cap * std::max(step, crease);
+            if (cap >= c.darkness) c.darkness = cap, c.shy = true;
+        }
+        c.flush = step < 0.5f;
         c.found = c.darkness > 0;
         return c;
     }

@@ -31,7 +31,8 @@ struct LineRules {
     float part = 0;          ///< two parts that meet
     float step = 0;          ///< nearer and farther surfaces, of one part or of two
     float crease = 0;        ///< two faces that meet at an edge
-    float cap = 0;           ///< a cut surface and what is no cut surface of that part
+    float cap = 0;           ///< where a cut surface ends or bends
+    float cap_part = 0;      ///< cut surfaces of two parts
     /// Whether a line between two samples is wanted, the nearer one first; empty: all are.
     std::function<bool(const LineSample& nearer, const LineSample& farther)> wanted;
 };

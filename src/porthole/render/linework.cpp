@@ -32,7 +32,7 @@ Mask widened(const Mask& mask, int reach) {
 LineRules line_rules(const View& view, bool all, bool caps) {
     LineRules rules;
     rules.half_width = line_half_width(view);
-    if (caps) rules.cap = kInnerDark;
+    if (caps) rules.cap = kInnerDark, rules.cap_part = kMeetDark;
     if (all) {
         rules.outline = kOutlineDark;
         rules.step = kStepDark;
@@ -66,8 +66,10 @@ LineTrace camera_trace(const Picture& picture, const Stage& stage, RayCounts& ra
             s.on_target = seen.on_target[i];
             const Hit& hit = seen.hit[i];
             if (!hit.any()) continue;
-            const SurfacePoint point = surface_point(stage.placements[index(hit.part)], hit, seen.direction[i]);
+            const SurfacePoint point = picture.camera.surface(stage.placements, hit, samples.x[i], samples.y[i],
+                                                              seen.depth[i], seen.direction[i]);
             s.part = hit.part;
+            s.cap = hit.cap;
             s.depth = seen.depth[i];
             s.position = point.position;
             s.normal = point.normal;

@@ -4,9 +4,8 @@
 
 namespace porthole {
 
-Camera::Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, float rim_px, const Caps* caps)
-    : bvh_(&bvh), targets_(targets), view_(&view), cut_(cut), caps_(caps && !caps->empty() ? caps : nullptr),
-      rim_px_(rim_px) {
+Camera::Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, const Caps* caps)
+    : bvh_(&bvh), targets_(targets), view_(&view), cut_(cut), caps_(caps && !caps->empty() ? caps : nullptr) {
     if (!cut) return;
     tolerance_ = float(1e-6 * scene_bounds(bvh.scene()).diagonal());
     for (std::size_t i = 0; i < cut->role.size(); ++i) {
@@ -36,7 +35,7 @@ Seen16 Camera::trace(const Samples16& samples, RayCounts& rays) const {
     for (int i = 0; i < kLanes; ++i) {
         seen.hit[i] = {};
         seen.depth[i] = kInfinity;
-        seen.in_hole[i] = seen.on_target[i] = seen.on_rim[i] = false;
+        seen.in_hole[i] = seen.on_target[i] = false;
         plain[i] = samples.active[i];
         any_open |= samples.active[i] && samples.may_open[i];
     }
@@ -117,7 +116,6 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
     if (has_cut_set_) trace_levels(samples, depth_per_t, seen, rays);
     for (int i = 0; i < kLanes; ++i)
         if (seen.on_target[i]) seen.depth[i] = target_depth[i];
-    if (rim_px_ > 0) mark_rim(samples, depth_per_t, seen, rays);
 }
 
 void Camera::trace_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
@@ -168,27 +166,6 @@ SurfacePoint Camera::surface(const std::vector<Placement>& placements, const Hit
                              Vec3f direction) const {
     if (hit.cap) return cap_point(*cut_, cut_->level_of(hit.part), x, y, depth);
     return surface_point(placements[index(hit.part)], hit, direction);
-}
-
-void Camera::mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
-                      RayCounts& rays) const {
-    RayHit16 packet;
-    bool any = false;
-    for (int i = 0; i < kLanes; ++i) {
-        packet.clear(i);
-        if (!seen.in_hole[i] || seen.on_target[i]) continue;
-        if (cut_->distance_at(samples.x[i], samples.y[i]) <= -rim_px_) continue;
-        packet.set(i, seen.origin[i], seen.direction[i], 0, kInfinity);
-        any = true;
-    }
-    if (!any) return;
-    // Where nothing was taken away the line would cross a surface that is whole.
-    intersect(*bvh_, packet, Coherence::coherent);
-    for (int i = 0; i < kLanes; ++i) {
-        if (!packet.active(i) && !packet.hit(i)) continue;
-        ++rays.primary;
-        seen.on_rim[i] = packet.hit(i) && packet.tfar[i] * depth_per_t[i] < seen.depth[i] - tolerance_;
-    }
 }
 
 void Camera::trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],

@@ -21,17 +21,14 @@ struct Seen16 {
     float depth[kLanes];    ///< metres along camera -z; +infinity if nothing is hit
     bool in_hole[kLanes];   ///< the sample lies in the hole: its rays obey the cut
     bool on_target[kLanes]; ///< in the hole, and an opened target is what it sees
-    bool on_rim[kLanes];    ///< on the line along the rim: something was cut away here
 };
 
 /// Traces camera rays of one view. Holds references; const use is thread-safe.
 class Camera {
 public:
     /// @param targets, cut  both null for a plain picture.
-    /// @param rim_px        width of the line along the rim.
     /// @param caps          of the cut; may be null.
-    Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, float rim_px,
-           const Caps* caps = nullptr);
+    Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, const Caps* caps = nullptr);
 
     /// Nearest hits. A sample that may open asks the targets first: one that hits sees the
     /// target, or what is kept in front of it; else it is in the hole where the rim's signed
@@ -51,14 +48,12 @@ private:
 
     void trace_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
                       RayCounts& rays) const;
-    void mark_rim(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen, RayCounts& rays) const;
 
     const Bvh* bvh_;
     const Bvh* targets_;
     const View* view_;
     const Cut* cut_;
     const Caps* caps_;
-    float rim_px_ = 0;
     float tolerance_ = 0; ///< metres in front of a target that count as behind it
     bool has_kept_ = false, has_cut_set_ = false, has_loose_ = false;
 };

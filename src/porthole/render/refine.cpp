@@ -32,21 +32,9 @@ PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole, int patte
     return ray;
 }
 
-/// The dark line along the rim, over whatever is there, background too.
-Vec4f rim_line(Vec4f c) {
-    constexpr float kBrightness = 0.25f;
-    return {c.x * kBrightness, c.y * kBrightness, c.z * kBrightness, 1.0f - (1.0f - c.w) * kBrightness};
-}
-
-/// What a pixel knows from its samples beyond the first.
-struct LaneState {
-    bool in_hole = false;
-    std::uint32_t on_rim = 0; ///< bit by sample of the group
-};
-
 /// Sample `s` of up to sixteen pixels, into slots group_index * 16 + lane of the shader.
 void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> pixels, int s, int group_index,
-                   Shader& shader, std::array<LaneState, kLanes>& state, RayCounts& rays) {
+                   Shader& shader, std::array<bool, kLanes>& in_hole, RayCounts& rays) {
     const GBuffer& buffer = picture.buffer;
     const Vec2f at = pixel_sample(s);
     Samples16 samples;
@@ -61,8 +49,7 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
     const std::uint32_t first = std::uint32_t(group_index) * kLanes;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
         const std::uint32_t slot = first + std::uint32_t(i);
-        state[i].in_hole |= seen.in_hole[i];
-        if (seen.on_rim[i]) state[i].on_rim |= 1u << group_index;
+        in_hole[i] = in_hole[i] || seen.in_hole[i];
         const Hit& hit = seen.hit[i];
         if (!hit.any()) {
             shader.miss(slot);
@@ -120,7 +107,7 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
             if (!pixel.has(Pixel::traced)) continue;
             const Vec4f c =
                 display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
-            picture.color(x, y) = pixel.has(Pixel::on_rim) ? rim_line(c) : c;
+            picture.color(x, y) = c;
             picture.opened(x, y) = pixel.has(Pixel::in_hole) ? 1 : 0;
         }
     picture.rays.add(rays);
@@ -143,27 +130,26 @@ void refine_tile(Picture& picture, const Stage& stage, Rect tile) {
     for (std::size_t begin = 0; begin < todo.size(); begin += kLanes) {
         const std::span<const Vec2i> pixels(todo.data() + begin, std::min<std::size_t>(kLanes, todo.size() - begin));
         std::array<Vec4f, kLanes> sum;
-        std::array<LaneState, kLanes> state;
+        std::array<bool, kLanes> in_hole{};
         for (std::size_t i = 0; i < pixels.size(); ++i) {
             sum[i] = picture.color(pixels[i].x, pixels[i].y);
-            state[i].in_hole = picture.opened(pixels[i].x, pixels[i].y) != 0;
+            in_hole[i] = picture.opened(pixels[i].x, pixels[i].y) != 0;
         }
         for (int s0 = 1; s0 < n; s0 += kGroup) {
             const int count = std::min(kGroup, n - s0);
             shader.clear();
-            for (LaneState& lane : state) lane.on_rim = 0;
-            for (int s = 0; s < count; ++s) trace_samples(picture, stage, pixels, s0 + s, s, shader, state, rays);
+            for (int s = 0; s < count; ++s) trace_samples(picture, stage, pixels, s0 + s, s, shader, in_hole, rays);
             shader.finish();
             for (int s = 0; s < count; ++s)
                 for (std::size_t i = 0; i < pixels.size(); ++i) {
                     const Vec4f c = display_color(shader.radiance(std::uint32_t(s) * kLanes + std::uint32_t(i)),
                                                   picture.params.background);
-                    sum[i] = sum[i] + ((state[i].on_rim >> s & 1u) ? rim_line(c) : c);
+                    sum[i] = sum[i] + c;
                 }
         }
         for (std::size_t i = 0; i < pixels.size(); ++i) {
             picture.color(pixels[i].x, pixels[i].y) = sum[i] * (1.0f / float(n));
-            picture.opened(pixels[i].x, pixels[i].y) = state[i].in_hole ? 1 : 0;
+            picture.opened(pixels[i].x, pixels[i].y) = in_hole[i] ? 1 : 0;
         }
     }
     picture.rays.add(rays);

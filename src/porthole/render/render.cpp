@@ -80,7 +80,7 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
 }
 
 Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, const Control& control) {
-    const Camera camera(bvh, nullptr, view, nullptr, 0);
+    const Camera camera(bvh, nullptr, view, nullptr);
     Picture picture(view, params, camera, view.window());
     mark_everything(picture);
     draw(picture, bvh, nullptr, nullptr, nullptr, control);
@@ -94,7 +94,7 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
     frame.inside = Mask(view.window(), 0);
     const Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
     if (window.empty()) return frame;
-    const Camera camera(bvh, targets, view, &cut, 0.0f, caps);
+    const Camera camera(bvh, targets, view, &cut, caps);
     Picture picture(view, params, camera, window);
     mark_hole(picture, cut);
     draw(picture, bvh, targets, &cut, &under.ids, control);
