@@ -207,6 +207,18 @@ void add_render(CLI::App& app, RenderOptions& o) {
     add_list(app, "--focus", o.focus, "Frame the picture on these parts, as reveal does on its targets")
         ->group("Camera");
     add_picture(app, o.picture);
+    app.option_defaults()->group("Look");
+    using Mode = RenderOptions::Mode;
+    add_choice<Mode>(app, "--mode", o.mode,
+                     {{"raytraced", Mode::raytraced}, {"flat", Mode::flat}, {"wireframe", Mode::wireframe}},
+                     "raytraced; flat: colour without light; wireframe: edges alone (default raytraced)");
+    add_choice<Wire>(app, "--wire", o.wire.wire,
+                     {{"auto", Wire::automatic}, {"mesh", Wire::mesh}, {"feature", Wire::feature}},
+                     "Edges of a wireframe: of all triangles, or outlines, creases and borders; auto: all where "
+                     "they are 8 px long on average (default auto)");
+    add_choice<HiddenLines>(app, "--hidden-lines", o.wire.hidden,
+                            {{"none", HiddenLines::none}, {"dashed", HiddenLines::dashed}},
+                            "Edges of a wireframe behind surfaces (default none)");
     add_common(app, o.common);
     app.footer("Examples:\n"
                "  porthole render engine.glb -o engine.png\n"

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "porthole/io/load.h"
+#include "porthole/render/wireframe.h"
 #include "porthole/reveal.h"
 
 namespace porthole::cli {
@@ -45,8 +46,12 @@ struct RevealOptions {
 };
 
 struct RenderOptions {
+    enum class Mode : std::uint8_t { raytraced, flat, wireframe };
+
     CommonOptions common;
     PictureOptions picture;
+    Mode mode = Mode::raytraced;
+    WireParams wire;                ///< its background comes from `picture`
     std::vector<std::string> focus; ///< selectors of parts that the picture is framed on
 };
 

@@ -26,7 +26,13 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
 
     const Stopwatch drawing;
     out.progress("render", 0);
-    const Frame frame = render(whole, nullptr, view, picture.render, nullptr, nullptr, control);
+    RenderParams look = picture.render;
+    if (options.mode == RenderOptions::Mode::flat) look.shading = Shading::flat;
+    WireParams wire = options.wire;
+    wire.background = look.background;
+    const Frame frame = options.mode == RenderOptions::Mode::wireframe
+                            ? render_wireframe(whole, view, wire, control)
+                            : render(whole, nullptr, view, look, nullptr, nullptr, control);
     report.run.render = drawing.seconds();
 
     const Stopwatch writing;

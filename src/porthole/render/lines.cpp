@@ -303,7 +303,11 @@ private:
 
     void lay(const LinePoint& a, const LinePoint& b, LineInk& ink) const {
         Ink& to = a.shy || b.shy ? ink.shy : ink.open;
-        to.add({a.at, b.at, rules_.half_width, a.darkness, b.darkness});
+        const Stroke stroke{a.at, b.at, rules_.half_width, a.darkness, b.darkness};
+        if (rules_.dash_px > 0)
+            to.add_dashed(stroke, rules_.dash_px);
+        else
+            to.add(stroke);
     }
 
     const View& view_;
@@ -319,6 +323,37 @@ private:
 };
 
 } // namespace
+
+LineTrace plain_trace(const Bvh& bvh, const View& view, const std::vector<Placement>& placements, RayCounts& rays) {
+    return [&](const Samples16& samples, LineSample* out) {
+        RayHit16 packet;
+        float depth_per_t[kLanes];
+        for (int i = 0; i < kLanes; ++i) {
+            if (!samples.active[i]) {
+                packet.clear(i);
+                continue;
+            }
+            const Ray ray = view.ray(samples.x[i], samples.y[i]);
+            packet.set(i, ray.origin, ray.direction, 0, kInfinity);
+            depth_per_t[i] = ray.depth_per_t;
+            ++rays.primary;
+        }
+        intersect(bvh, packet, Coherence::coherent);
+        for (int i = 0; i < kLanes; ++i) {
+            if (!samples.active[i]) continue;
+            LineSample& s = out[i];
+            s = {};
+            if (!packet.hit(i)) continue;
+            const Hit hit{packet.part(i), packet.triangle[i], packet.u[i], packet.v[i]};
+            const SurfacePoint point = surface_point(placements[index(hit.part)], hit, packet.direction(i));
+            s.part = hit.part;
+            s.depth = packet.tfar[i] * depth_per_t[i];
+            s.position = point.position;
+            s.normal = point.normal;
+            s.flat_normal = point.flat_normal;
+        }
+    };
+}
 
 void find_lines(const View& view, Rect tile, const std::function<bool(int x, int y)>& inside, const LineTrace& trace,
                 const LineRules& rules, LineInk& ink) {

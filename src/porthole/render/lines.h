@@ -24,6 +24,10 @@ struct LineSample {
 /// Looks at up to sixteen positions; fills the active lanes.
 using LineTrace = std::function<void(const Samples16& samples, LineSample* seen)>;
 
+/// Rays through everything in `bvh`; counts them in `rays`. Keeps references.
+[[nodiscard]] LineTrace plain_trace(const Bvh& bvh, const View& view, const std::vector<Placement>& placements,
+                                    RayCounts& rays);
+
 /// How dark lines are, by what they separate: share of the light taken, [0, 1]; 0: not drawn.
 struct LineRules {
     float half_width = 0.5f; ///< pixels
@@ -33,6 +37,7 @@ struct LineRules {
     float crease = 0;        ///< two faces that meet at an edge
     float cap = 0;           ///< where a cut surface ends or bends
     float cap_part = 0;      ///< cut surfaces of two parts
+    float dash_px = 0;       ///< length of dashes; 0: solid
     /// Whether a line between two samples is wanted, the nearer one first; empty: all are.
     std::function<bool(const LineSample& nearer, const LineSample& farther)> wanted;
 };

@@ -41,6 +41,32 @@ void Ink::add(const Stroke& stroke) {
     }
 }
 
+void Ink::add_dashed(const Stroke& stroke, float on_px) {
+    // Directions are rounded to one of eight, so that neighbouring pieces measure alike.
+    constexpr int kDirections = 8;
+    static constexpr Vec2f kAxis[kDirections] = {
+        {1, 0}, {0.92388f, 0.38268f},  {0.70711f, 0.70711f},  {0.38268f, 0.92388f},
+        {0, 1}, {-0.38268f, 0.92388f}, {-0.70711f, 0.70711f}, {-0.92388f, 0.38268f}};
+    const Vec2f d = stroke.b - stroke.a;
+    int best = 0;
+    for (int i = 1; i < kDirections; ++i)
+        if (std::abs(dot(d, kAxis[i])) > std::abs(dot(d, kAxis[best]))) best = i;
+    const float from = dot(stroke.a, kAxis[best]), along = dot(d, kAxis[best]);
+    const float period = on_px * (5.0f / 3.0f);
+    const float low = std::min(from, from + along), high = std::max(from, from + along);
+    if (!(high > low)) return;
+    for (float k = std::floor(low / period); k * period < high; k += 1) {
+        const float begin = std::max(low, k * period), end = std::min(high, k * period + on_px);
+        if (!(end > begin)) continue;
+        const auto at = [&](float v) { return (v - from) / along; };
+        const float t0 = at(begin), t1 = at(end);
+        const auto dark = [&](float t) {
+            return stroke.darkness_a + (stroke.darkness_b - stroke.darkness_a) * clamp01(t);
+        };
+        add({stroke.a + d * t0, stroke.a + d * t1, stroke.half_width, dark(t0), dark(t1)});
+    }
+}
+
 float Ink::darkness(int x, int y) const {
     float sum = 0;
     for (const float part : at(x, y)) sum += part;

@@ -32,6 +32,10 @@ public:
     }
     /// Lays a stroke. Cost: sixteen distances for each pixel it comes near.
     void add(const Stroke& stroke);
+    /// The dashes of a stroke, `on_px` long with gaps of two thirds of that. Where they lie follows
+    /// from the position along the stroke's direction, so that the pieces of a curve go on with
+    /// the pattern and lines that coincide have their dashes in the same places.
+    void add_dashed(const Stroke& stroke, float on_px);
     /// Lays ink on one sub-position.
     void darken(int x, int y, int i, float darkness) {
         float& part = at(x, y)[std::size_t(i)];

@@ -1,0 +1,36 @@
+// The paper's wireframe: edges of the triangles, with hidden lines left out or dashed.
+#pragma once
+
+#include "porthole/render/render.h"
+
+namespace porthole {
+
+enum class Wire : std::uint8_t {
+    automatic, ///< mesh where edges in the picture are 8 px long on average, else feature
+    mesh,      ///< every edge of every triangle
+    feature    ///< outlines, creases over 30 degrees, and edges that do not join two triangles
+};
+enum class HiddenLines : std::uint8_t { none, dashed };
+
+struct WireParams {
+    Wire wire = Wire::automatic;
+    HiddenLines hidden = HiddenLines::none;
+    float width_px = 1;        ///< in pixels of a picture up to 1080 high, in higher ones as much wider, (0, 100]
+    Vec3f background{1, 1, 1}; ///< linear; lines are dark on it, or light where it is darker than mid grey
+};
+
+/// Draws the edges of everything in `bvh` without surfaces: alpha 0 between the lines.
+///
+/// Edges are found on each mesh after welding its vertices, projected, and asked along their
+/// length, every pixel, whether something lies in front: surfaces are opaque, whatever their
+/// material. That needs no orientation, closedness or connection of the triangles. What is nearer
+/// than a third of a pixel's size does not hide. Primitives have no edges: their outlines and
+/// creases are found by rays.
+/// @return colour and ids as render() does.
+/// @throws Error usage E0140; limit E0902; Cancelled.
+/// The same bits for any number of threads. Reports progress as stage "render".
+/// Cost: a sort of the edges and a ray for each pixel of their length.
+[[nodiscard]] Frame render_wireframe(const Bvh& bvh, const View& view, const WireParams& params = {},
+                                     const Control& control = {});
+
+} // namespace porthole
