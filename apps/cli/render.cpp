@@ -44,7 +44,7 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     report.run.write = writing.seconds();
 
     report.view = view;
-    report.options.render = picture.render;
+    report.options.render = look;
     report.nothing_to_cut = true;
     report.frame_rays = frame.rays;
     report.run.threads = thread_count(control);
