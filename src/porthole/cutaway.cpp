@@ -157,8 +157,9 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
     Mask beside_targets = hole.mask;
     for (std::size_t i = 0; i < beside_targets.pixels().size(); ++i)
         if (plan.target_ids.id.pixels()[i] != kNoPart) beside_targets.pixels()[i] = 0;
-    plan.walls = trace_layers(cut_bvh, view, beside_targets, hole.floor_depth, plan.cut.level, 1, tolerance, control,
-                              &plan.rays.walls);
+    const std::size_t levels = params.steps ? find_levels(subject, cut_bvh, plan, control) : 1;
+    plan.walls = trace_layers(cut_bvh, view, beside_targets, hole.floor_depth, plan.cut.level, levels, tolerance,
+                              control, &plan.rays.walls);
     std::vector<Wall> walls;
     for (const LayerDepths& layer : plan.walls) {
         Wall& wall = walls.emplace_back(Wall{layer.first, layer.next});

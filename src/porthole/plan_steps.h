@@ -37,6 +37,17 @@ struct CutawayMargins {
 /// Closing radius that style cutaway tries first.
 [[nodiscard]] int closing_radius_px(const View& view);
 
+/// Sorts the cut set into levels that open one step after the other: fills plan.cut.level (left
+/// empty where there is only one).
+///
+/// A layer is a part within which the floor lies over most of the core, as within skin, skull
+/// and brain. Every other part belongs to the innermost layer that is mostly in front of it.
+/// @param plan  with cut set, core and hole.
+/// @return how many levels, 1 to 4.
+/// Cost: some 2000 rays along their whole length.
+[[nodiscard]] std::size_t find_levels(const Subject& subject, const Bvh& cut_bvh, ViewPlan& plan,
+                                      const Control& control);
+
 /// The rest of a plan of style cutaway once the targets are known: cut set, core, hole, cut.
 /// @param ids    the opened targets in the window that the closing needs, which holds plan.window;
 ///               plan.target_ids, contours and spans are made.
