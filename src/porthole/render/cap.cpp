@@ -15,6 +15,7 @@ constexpr float kGrey = 0.8f;
 constexpr float kLift = 0.12f;     ///< ambient light that caps get on top, of their albedo
 constexpr float kHatchSpacing = 9; ///< pixels of a picture 1080 high
 constexpr float kHatchWidth = 1.6f;
+constexpr float kOff = 0.01f;     ///< how far off a flat cut surface secondary rays start, pixel sizes
 constexpr float kHatchInk = 0.3f; ///< brightness of a hatch line
 
 float luminance(Vec3f c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
@@ -44,6 +45,7 @@ SurfacePoint cap_point(const Cut& cut, std::size_t level, float x, float y, floa
     const Vec3f to_eye = -view.ray(x, y).direction;
     const CutDepth own = cut.depth_at(x, y, level);
     // The slope along one axis of the picture: from both sides if the surface goes on there.
+    float bend = 0; // how far the surface leaves its tangent plane within a pixel, metres
     const auto slope = [&](float dx, float dy, Vec3f& along) {
         const auto joined = [&](float sign, float& z) {
             const float px = x + sign * dx, py = y + sign * dy;
@@ -56,18 +58,19 @@ SurfacePoint cap_point(const Cut& cut, std::size_t level, float x, float y, floa
         float before = depth, after = depth;
         const bool has_before = joined(-1, before), has_after = joined(1, after);
         if (!has_before && !has_after) return false;
+        if (has_before && has_after) bend = std::max(bend, 2 * std::abs(before - 2 * depth + after));
         along = (has_after ? at(x + dx, y + dy, after) : point.position) -
                 (has_before ? at(x - dx, y - dy, before) : point.position);
         return true;
     };
     Vec3f right, down;
     Vec3f normal = to_eye;
-    if (slope(1, 0, right) && slope(0, 1, down)) normal = normalize(cross(right, down), to_eye);
+    if (slope(0.5f, 0, right) && slope(0, 0.5f, down)) normal = normalize(cross(right, down), to_eye);
     if (dot(normal, to_eye) < 0) normal = -normal;
     point.flat_normal = point.normal = normal;
-    const float off = view.pixel_size(depth);
-    point.start = point.position + normal * off;
-    point.beyond = point.position - normal * (0.01f * off);
+    const float pixel = view.pixel_size(depth);
+    point.start = point.position + normal * std::min(kOff * pixel + bend, pixel);
+    point.beyond = point.position - normal * (kOff * pixel);
     point.front = true;
     return point;
 }

@@ -9,8 +9,8 @@ namespace porthole {
 
 /// The point of a level's cut surface at continuous pixel position (x, y), which lies in the
 /// hole, at `depth`. Its normal follows from the depths a pixel to the sides, not across
-/// steps; it faces the viewer. Secondary rays start a pixel's size off the surface, so that the
-/// facets of the cap mesh cast no shadow on it.
+/// steps; it faces the viewer. Secondary rays start as far off the surface as it bends within a
+/// pixel, so that the facets of the cap mesh cast no shadow on it.
 [[nodiscard]] SurfacePoint cap_point(const Cut& cut, std::size_t level, float x, float y, float depth);
 
 /// What a cap is made of.

@@ -179,6 +179,9 @@ CutDepth cut_at(const Cut& cut, std::size_t level, int x, int y) {
     return {p.depth(inside), p.on_chamfer(inside)};
 }
 
+/// The chamfer's depth, also a little beyond its ends.
+float sloped(const CutProfile& p, float inside) { return std::min(p.floor, p.front + p.slope * (inside - p.start)); }
+
 /// Makes the mesh of one tile.
 class TileMesh {
 public:
@@ -221,16 +224,20 @@ private:
         const Ray ray = cut_.view.ray(float(pixel.x), float(pixel.y));
         return ray.origin + ray.direction * (depth / ray.depth_per_t);
     }
-    /// Mean depth of the pixels around a corner that the slope joins to pixel (x, y).
+    /// Depth at a corner of pixel (x, y): the mean of what the pixels around the corner that the
+    /// slope joins make of it. On the chamfer each goes on with its own slope, so that squares
+    /// at its edges lie in it as well.
     [[nodiscard]] float corner_depth(std::size_t level, int x, int y, int cx, int cy) const {
         const CutDepth own = cut_at(cut_, level, x, y);
+        const float inside = -cut_.distance_at(float(cx), float(cy));
         float sum = 0;
         int n = 0;
         for (int py = cy - 1; py <= cy; ++py)
             for (int px = cx - 1; px <= cx; ++px) {
                 const CutDepth d = cut_at(cut_, level, px, py);
                 if (d.depth == -kInfinity || is_cut_step(cut_.view, own, d)) continue;
-                sum += d.depth;
+                const CutProfile& p = cut_.levels[level](px, py);
+                sum += d.chamfer ? sloped(p, inside) : d.depth;
                 ++n;
             }
         return sum / float(n);
@@ -322,8 +329,15 @@ private:
             if (other.depth == -kInfinity)
                 add_walls(lane, level, x, y, d, -kInfinity, own.depth, depth_per_t);
             else if (other.depth > own.depth)
-                add_walls(lane, level, x, y, d, own.depth, other.depth, depth_per_t);
+                add_walls(lane, level, x, y, d, edge_depth(own, level, x, y, d), other.depth, depth_per_t);
         }
+    }
+
+    /// Where the cut of a pixel ends at its edge towards a neighbour.
+    [[nodiscard]] float edge_depth(const CutDepth& own, std::size_t level, int x, int y, Vec2i d) const {
+        if (!own.chamfer) return own.depth;
+        const float ex = float(x) + 0.5f + 0.5f * float(d.x), ey = float(y) + 0.5f + 0.5f * float(d.y);
+        return std::max(own.depth, sloped(cut_.levels[level](x, y), -cut_.distance_at(ex, ey)));
     }
 
     void add_walls(std::span<const Passage> lane, std::size_t level, int x, int y, Vec2i d, float near, float far,
