@@ -215,7 +215,7 @@ void add_render(CLI::App& app, RenderOptions& o) {
     add_choice<Wire>(app, "--wire", o.wire.wire,
                      {{"auto", Wire::automatic}, {"mesh", Wire::mesh}, {"feature", Wire::feature}},
                      "Edges of a wireframe: of all triangles, or outlines, creases and borders; auto: all where "
-                     "they are 8 px long on average (default auto)");
+                     "they are 8 px long on average and hidden ones are left out (default auto)");
     add_choice<HiddenLines>(app, "--hidden-lines", o.wire.hidden,
                             {{"none", HiddenLines::none}, {"dashed", HiddenLines::dashed}},
                             "Edges of a wireframe behind surfaces (default none)");

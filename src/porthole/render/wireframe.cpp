@@ -13,23 +13,30 @@ namespace porthole {
 namespace {
 
 constexpr float kLongEdge = 8;                   ///< pixels; meshes of longer edges are drawn as they are
-constexpr double kCreaseCosine = 0.866;          ///< 30 degrees
+constexpr double kFlatCosine = 0.966;            ///< 15 degrees; what bends less is no crease
+constexpr double kSharpCosine = 0.866;           ///< 30 degrees; creases where there are no vertex normals
+constexpr double kAlwaysCosine = 0.5;            ///< 60 degrees; creases whatever the vertex normals say
+constexpr float kSplitCosine = 0.966f;           ///< vertex normals that differ more mean a crease
 constexpr float kHides = 1.0f / 3.0f;            ///< pixel sizes in front of an edge from which on a surface hides it
 constexpr float kVisible = 0.9f, kHidden = 0.5f; ///< darkness
+constexpr float kFeatureWidth = 1.25f;           ///< of width_px
 constexpr float kDash = 6;                       ///< pixels
 constexpr int kTile = 64;
 constexpr std::size_t kChunk = 4096; ///< edges that one thread takes at once
 
 /// An edge of a welded mesh.
 struct MeshEdge {
-    std::uint32_t a = 0, b = 0;                             ///< vertices
-    std::uint32_t first = 0, second = 0;                    ///< triangles
-    enum : std::uint8_t { odd, joined, turned } kind = odd; ///< turned: joined, the triangles facing different ways
+    enum Kind : std::uint8_t { odd, joined, turned }; ///< turned: joined, the triangles facing different ways
+
+    std::uint32_t triangle[2] = {0, 0};
+    std::uint32_t a[2] = {0, 0}, b[2] = {0, 0}; ///< vertices of its ends in either triangle
+    Kind kind = odd;
 };
 
 std::vector<MeshEdge> mesh_edges(const Mesh& mesh) {
     struct Side {
-        std::uint32_t low, high, triangle;
+        std::uint32_t low, high; ///< welded vertices
+        std::uint32_t triangle, corner;
         bool forward;
     };
     const std::vector<std::uint32_t> vertex = weld(mesh.positions);
@@ -39,9 +46,9 @@ std::vector<MeshEdge> mesh_edges(const Mesh& mesh) {
         const Vec3u& t = mesh.triangles[i];
         const std::uint32_t corner[3] = {vertex[t.x], vertex[t.y], vertex[t.z]};
         if (corner[0] == corner[1] || corner[1] == corner[2] || corner[2] == corner[0]) continue;
-        for (int k = 0; k < 3; ++k) {
+        for (std::uint32_t k = 0; k < 3; ++k) {
             const std::uint32_t a = corner[k], b = corner[(k + 1) % 3];
-            sides.push_back({std::min(a, b), std::max(a, b), i, a < b});
+            sides.push_back({std::min(a, b), std::max(a, b), i, k, a < b});
         }
     }
     std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
@@ -51,11 +58,16 @@ std::vector<MeshEdge> mesh_edges(const Mesh& mesh) {
     for (std::size_t i = 0; i < sides.size();) {
         std::size_t end = i + 1;
         while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
-        MeshEdge edge{sides[i].low, sides[i].high, sides[i].triangle, sides[i].triangle, MeshEdge::odd};
-        if (end == i + 2) {
-            edge.second = sides[i + 1].triangle;
-            edge.kind = sides[i].forward != sides[i + 1].forward ? MeshEdge::joined : MeshEdge::turned;
+        MeshEdge edge;
+        for (std::size_t k = 0; k < 2; ++k) {
+            const Side& side = sides[k == 0 ? i : end - 1];
+            const Vec3u& t = mesh.triangles[side.triangle];
+            const std::uint32_t corner[3] = {t.x, t.y, t.z};
+            const std::uint32_t from = corner[side.corner], to = corner[(side.corner + 1) % 3];
+            edge.triangle[k] = side.triangle;
+            edge.a[k] = side.forward ? from : to, edge.b[k] = side.forward ? to : from;
         }
+        if (end == i + 2) edge.kind = sides[i].forward != sides[i + 1].forward ? MeshEdge::joined : MeshEdge::turned;
         edges.push_back(edge);
         i = end;
     }
@@ -74,16 +86,27 @@ public:
 
     [[nodiscard]] bool operator()(const MeshEdge& edge) const {
         if (edge.kind == MeshEdge::odd) return true;
-        const Vec3d n = normal(edge.first), m = normal(edge.second) * (edge.kind == MeshEdge::turned ? -1.0 : 1.0);
+        const Vec3d n = normal(edge.triangle[0]);
+        const Vec3d m = normal(edge.triangle[1]) * (edge.kind == MeshEdge::turned ? -1.0 : 1.0);
         const double nn = dot(n, n), mm = dot(m, m);
         if (!(nn > 0) || !(mm > 0)) return false;
-        if (dot(n, m) < kCreaseCosine * std::sqrt(nn * mm)) return true;
-        const Vec3d p = transform_.point(Vec3d(mesh_.positions[edge.a]));
+        if (is_crease(edge, dot(n, m) / std::sqrt(nn * mm))) return true;
+        const Vec3d p = transform_.point(Vec3d(mesh_.positions[edge.a[0]]));
         const Vec3d sight = view_.orthographic ? forward_ : p - eye_;
         return (dot(n, sight) < 0) != (dot(m, sight) < 0);
     }
 
 private:
+    /// Vertex normals tell a rounded edge from a sharp one.
+    [[nodiscard]] bool is_crease(const MeshEdge& edge, double cosine) const {
+        if (cosine > kFlatCosine) return false;
+        if (cosine < kAlwaysCosine) return true;
+        if (mesh_.normals.empty()) return cosine < kSharpCosine;
+        const auto split = [&](const std::uint32_t(&vertex)[2]) {
+            return std::abs(dot(mesh_.normals[vertex[0]], mesh_.normals[vertex[1]])) < kSplitCosine;
+        };
+        return split(edge.a) && split(edge.b);
+    }
     [[nodiscard]] Vec3d normal(std::uint32_t triangle) const {
         const Vec3u& t = mesh_.triangles[triangle];
         const Vec3d a = transform_.point(Vec3d(mesh_.positions[t.x]));
@@ -218,8 +241,8 @@ class Wireframe {
 public:
     Wireframe(const Bvh& bvh, const View& view, const WireParams& params, const Control& control)
         : bvh_(bvh), scene_(bvh.scene()), view_(view), params_(params), control_(control),
-          half_width_(0.5f * params.width_px * line_scale(view)), margin_(int(std::ceil(half_width_)) + 2),
-          nearest_(float(1e-6 * scene_bounds(scene_).diagonal())) {}
+          half_width_(0.5f * kFeatureWidth * params.width_px * line_scale(view)),
+          margin_(int(std::ceil(half_width_)) + 2), nearest_(float(1e-6 * scene_bounds(scene_).diagonal())) {}
 
     Frame draw() {
         Frame frame;
@@ -253,7 +276,9 @@ private:
         parallel_for(of_mesh.size(), control_, [&](std::size_t i) {
             if (used[i]) of_mesh[i] = mesh_edges(scene_.meshes[i]);
         });
-        const bool all = params_.wire == Wire::mesh || (params_.wire == Wire::automatic && edges_are_long(of_mesh));
+        const bool all = params_.wire == Wire::mesh || (params_.wire == Wire::automatic &&
+                                                        params_.hidden == HiddenLines::none && edges_are_long(of_mesh));
+        half_width_ = 0.5f * line_scale(view_) * (all ? 1.0f : kFeatureWidth) * params_.width_px;
         Edges edges;
         edges.by_part.resize(scene_.parts.size());
         parallel_for(scene_.parts.size(), control_, [&](std::size_t i) {
@@ -280,8 +305,8 @@ private:
     }
 
     [[nodiscard]] static Edge in_world(const Part& part, const Mesh& mesh, const MeshEdge& edge) {
-        return {Vec3f(part.world_from_mesh.point(Vec3d(mesh.positions[edge.a]))),
-                Vec3f(part.world_from_mesh.point(Vec3d(mesh.positions[edge.b])))};
+        return {Vec3f(part.world_from_mesh.point(Vec3d(mesh.positions[edge.a[0]]))),
+                Vec3f(part.world_from_mesh.point(Vec3d(mesh.positions[edge.b[0]])))};
     }
 
     /// Whether the edges in the picture are long enough to be told apart. Looks at some thousands.

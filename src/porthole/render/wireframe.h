@@ -6,9 +6,9 @@
 namespace porthole {
 
 enum class Wire : std::uint8_t {
-    automatic, ///< mesh where edges in the picture are 8 px long on average, else feature
+    automatic, ///< mesh where edges in the picture are 8 px long on average and hidden ones are left out, else feature
     mesh,      ///< every edge of every triangle
-    feature    ///< outlines, creases over 30 degrees, and edges that do not join two triangles
+    feature    ///< outlines, creases, and edges that do not join two triangles; a quarter wider
 };
 enum class HiddenLines : std::uint8_t { none, dashed };
 
@@ -24,7 +24,8 @@ struct WireParams {
 /// Edges are found on each mesh after welding its vertices, projected, and asked along their
 /// length, every pixel, whether something lies in front: surfaces are opaque, whatever their
 /// material. That needs no orientation, closedness or connection of the triangles. What is nearer
-/// than a third of a pixel's size does not hide. Primitives have no edges: their outlines and
+/// than a third of a pixel's size does not hide. An edge is a crease from 60 degrees on, from 15 where
+/// vertex normals are split at it, from 30 without vertex normals. Primitives have no edges: their outlines and
 /// creases are found by rays.
 /// @return colour and ids as render() does.
 /// @throws Error usage E0140; limit E0902; Cancelled.
