@@ -73,7 +73,7 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
     add_caps(opened, caps.mesh);
     Frame plain;
     if (!revealed.plan.nothing_revealed()) {
-        plain = render(subject.whole, nullptr, view, look, nullptr, nullptr, control);
+        plain = render_around(subject.whole, view, look, revealed.plan.cut, control);
         if (revealed.plan.nothing_to_cut()) {
             revealed.frame = plain;
         } else {

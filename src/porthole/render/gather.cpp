@@ -15,6 +15,8 @@ bool near_hole(const Cut& cut, int x, int y, int reach) {
     return false;
 }
 
+bool is_covered(const Picture& picture, int x, int y) { return picture.covered.at_or(x, y, 0) != 0; }
+
 std::uint16_t quantised(float value, float unit) {
     return std::uint16_t(std::lround(std::min(value * unit, 65535.0f)));
 }
@@ -37,7 +39,7 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
         samples.x[i] = float(x) + 0.5f, samples.y[i] = float(y) + 0.5f;
         if (!tile.contains(x, y)) continue;
         const Pixel& pixel = buffer.pixels(x, y);
-        samples.active[i] = pixel.has(Pixel::traced);
+        samples.active[i] = pixel.has(Pixel::traced) || is_covered(picture, x, y);
         samples.may_open[i] = pixel.has(Pixel::may_open);
         any |= samples.active[i];
     }
@@ -56,7 +58,7 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
         const Hit& hit = seen.hit[i];
         buffer.ids.id(x, y) = hit.part;
         buffer.ids.depth(x, y) = seen.depth[i];
-        if (!hit.any()) continue;
+        if (!hit.any() || !pixel.has(Pixel::traced)) continue;
         pixel.triangle = hit.triangle, pixel.u = hit.u, pixel.v = hit.v;
         const SurfacePoint point =
             picture.camera.surface(placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
@@ -110,8 +112,33 @@ void RayTotals::add(const RayCounts& rays) {
 
 RayCounts RayTotals::get() const { return {primary_, shadow_, ambient_, reflection_, refraction_}; }
 
-void mark_everything(Picture& picture) {
+void mark_everything(Picture& picture, const Cut* cut) {
     for (Pixel& pixel : picture.buffer.pixels.pixels()) pixel.flags = Pixel::traced;
+    if (!cut || cut->empty()) return;
+    // Samples of a pixel one inside the rim may see the plain scene; beside it the filter and
+    // the edges look kLightMargin further.
+    constexpr int kReach = kLightMargin + 1;
+    const Rect w = picture.buffer.window();
+    picture.covered = Mask(w, 0);
+    const Rect box = cut->distance.window().intersected(w);
+    // How many pixels in a row, then in a column of rows, lie in the hole.
+    Mask run(w, 0);
+    for (int y = box.y0; y < box.y1; ++y) {
+        int length = 0;
+        for (int x = box.x0; x < box.x1; ++x) {
+            length = cut->distance(x, y) <= 0 ? length + 1 : 0;
+            if (length > 2 * kReach) run(x - kReach, y) = 1;
+        }
+    }
+    for (int x = box.x0; x < box.x1; ++x) {
+        int length = 0;
+        for (int y = box.y0; y < box.y1; ++y) {
+            length = run(x, y) ? length + 1 : 0;
+            if (length <= 2 * kReach) continue;
+            picture.covered(x, y - kReach) = 1;
+            picture.buffer.pixels(x, y - kReach).flags = 0;
+        }
+    }
 }
 
 Rect hole_window(const Cut& cut, const View& view) {

@@ -28,6 +28,7 @@ struct Picture {
     GBuffer buffer;
     Image<Vec4f> color; ///< display-linear, premultiplied; the buffer's window
     Mask edges;         ///< 1 where the first sample is not enough
+    Mask covered;       ///< 1 where only the ids are wanted; empty: nowhere
     Mask opened;        ///< with a cut: 1 where some sample is in the hole
     RayTotals rays;
 
@@ -35,8 +36,9 @@ struct Picture {
         : view(seen), params(how), camera(by), buffer(window), color(window, Vec4f{}), edges(window), opened(window) {}
 };
 
-/// Marks what is to be traced in the plain picture: everything.
-void mark_everything(Picture& picture);
+/// Marks what is to be traced in the plain picture: everything. Of pixels that `cut`, if there
+/// is one, opens so far around that their light and edges are of no use to others, only the ids.
+void mark_everything(Picture& picture, const Cut* cut = nullptr);
 
 /// Marks the pixels that can have samples in the hole, those that the rim may cross, and a
 /// few around, whose light the filter and the rim's samples need.

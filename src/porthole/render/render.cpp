@@ -79,10 +79,11 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     passes.run(0.05, [&](Rect tile) { draw_lines(picture, stage, rim, tile); });
 }
 
-Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, const Control& control) {
+Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, const Cut* covering,
+                 const Control& control) {
     const Camera camera(bvh, nullptr, view, nullptr);
     Picture picture(view, params, camera, view.window());
-    mark_everything(picture);
+    mark_everything(picture, covering);
     draw(picture, bvh, nullptr, nullptr, nullptr, control);
     return {std::move(picture.color), std::move(picture.buffer.ids), {}, picture.rays.get()};
 }
@@ -115,20 +116,31 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
     return frame;
 }
 
-} // namespace
-
-Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* cut,
-             const Frame* under, const Control& control, const Caps* caps) {
+template <typename Draw> Frame drawn(const View& view, const RenderParams& params, Draw&& draw) {
     check(params);
-    assert(!cut == !under);
     try {
-        return cut ? draw_hole(bvh, targets, view, params, *cut, *under, caps, control)
-                   : draw_plain(bvh, view, params, control);
+        return draw();
     } catch (const std::bad_alloc&) {
         throw Error(ErrorKind::limit, "E0902", "render",
                     "memory ran out for a picture of " + std::to_string(view.width) + " x " +
                         std::to_string(view.height));
     }
+}
+
+} // namespace
+
+Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* cut,
+             const Frame* under, const Control& control, const Caps* caps) {
+    assert(!cut == !under);
+    return drawn(view, params, [&] {
+        return cut ? draw_hole(bvh, targets, view, params, *cut, *under, caps, control)
+                   : draw_plain(bvh, view, params, nullptr, control);
+    });
+}
+
+Frame render_around(const Bvh& bvh, const View& view, const RenderParams& params, const Cut& cut,
+                    const Control& control) {
+    return drawn(view, params, [&] { return draw_plain(bvh, view, params, &cut, control); });
 }
 
 } // namespace porthole

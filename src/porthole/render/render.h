@@ -90,4 +90,9 @@ struct Frame {
 [[nodiscard]] Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params,
                            const Cut* cut, const Frame* under, const Control& control = {}, const Caps* caps = nullptr);
 
+/// The plain picture as render() needs it `under` a hole: with all its ids, but without colour
+/// where the hole will cover it. Everywhere else the bits are those of the plain picture.
+[[nodiscard]] Frame render_around(const Bvh& bvh, const View& view, const RenderParams& params, const Cut& cut,
+                                  const Control& control = {});
+
 } // namespace porthole

@@ -459,6 +459,20 @@ struct OpenedBox : BoxInBox {
     OpenedBox& operator=(const OpenedBox&) = delete;
 };
 
+TEST(RenderCut, WhatTheHoleCoversNeedNotBeDrawnBefore) {
+    const OpenedBox b;
+    for (const RenderParams& params : {RenderParams{}, RenderParams{.samples = 1}, RenderParams{.lines = Lines::all}}) {
+        const Frame plain = render(b.whole, nullptr, b.view, params, nullptr, nullptr);
+        const Frame around = render_around(b.whole, b.view, params, b.cut);
+        EXPECT_EQ(around.ids, plain.ids);
+        EXPECT_LT(around.rays.shadow, plain.rays.shadow * 9 / 10);
+        const Frame over_plain = render(b.whole, &b.targets, b.view, params, &b.cut, &plain);
+        const Frame over_around = render(b.whole, &b.targets, b.view, params, &b.cut, &around);
+        EXPECT_EQ(over_around.color, over_plain.color);
+        EXPECT_EQ(over_around.ids, over_plain.ids);
+    }
+}
+
 TEST(RenderCut, OutsideTheHoleThePictureIsThePlainOneBitForBit) {
     const OpenedBox b;
     const Frame plain = render(b.whole, nullptr, b.view, {}, nullptr, nullptr);
