@@ -201,7 +201,7 @@ struct SceneReader {
     }
     /// @throws Error E1003 where many placements together left what float coordinates can hold.
     void check_placement(const Json& at, const Affine3d& m) const {
-        constexpr double kLeast = 1e-9, kMost = 1e9, kFlattest = 1e-6;
+        constexpr double kLeast = 1e-9, kMost = 1e9, kFlattest = 1e-3;
         double product = 1;
         for (const Vec3d& column : {m.x, m.y, m.z}) {
             const double l = length(column);
@@ -213,7 +213,7 @@ struct SceneReader {
         if (!(length(m.p) <= kMost))
             doc.fail("E1003", at, {}, "lies more than 1e9 m away after all placements together");
         if (!(std::abs(m.determinant()) > kFlattest * product))
-            doc.fail("E1003", at, {}, "is flattened by its placements together");
+            doc.fail("E1003", at, {}, "is flattened or sheared by its placements together");
     }
 
     /// Maps the unit axis -y..y to `from`..`to`, x and z to radius 1.
