@@ -75,11 +75,29 @@ private:
     std::vector<std::uint32_t> begin_, in_order_;
 };
 
+/// By line, then along it. Linear when lines have few piercings each.
+std::vector<Piercing> sorted(const std::vector<Piercing>& piercings, std::size_t lines) {
+    std::vector<std::size_t> end(lines + 1, 0); // counts, then starts, then ends
+    for (const Piercing& p : piercings) ++end[p.line + 1];
+    std::partial_sum(end.begin(), end.end(), end.begin());
+    std::vector<Piercing> out(piercings.size());
+    for (const Piercing& p : piercings) out[end[p.line]++] = p;
+    for (std::size_t line = 0, begin = 0; line < lines; begin = end[line++])
+        std::sort(out.begin() + std::ptrdiff_t(begin), out.begin() + std::ptrdiff_t(end[line]),
+                  [](const Piercing& l, const Piercing& r) {
+                      return std::tie(l.along, l.triangle) < std::tie(r.along, r.triangle);
+                  });
+    return out;
+}
+
+/// What a piercing costs, to keep and to sort, in pairs that are only looked at.
+constexpr std::uint64_t kPairsPerPiercing = 8;
+
 } // namespace
 
 std::optional<std::vector<Piercing>> find_piercings(const Mesh& mesh, std::span<const std::uint8_t> wanted,
                                                     Vec3d direction, std::span<const Vec3d> points,
-                                                    std::uint64_t budget) {
+                                                    std::uint64_t budget, double from) {
     // Along an axis the frame holds zeros and ones only, and projecting rounds nothing.
     const Vec3d u =
         normalize(std::abs(direction.y) < 0.6 ? cross(direction, Vec3d{0, 1, 0}) : cross(direction, Vec3d{1, 0, 0}));
@@ -112,15 +130,14 @@ std::optional<std::vector<Piercing>> find_piercings(const Mesh& mesh, std::span<
             const Vec3d q = points[line];
             const double along = wa * dot(corner[0] - q, direction) + wb * dot(corner[1] - q, direction) +
                                  (1 - wa - wb) * dot(corner[2] - q, direction);
+            if (along < from) return;
+            looked_at += kPairsPerPiercing;
             // Counter-clockwise as seen against the direction: the normal points along it.
             out.push_back({line, i, sc.sign < 0, along});
         });
         if (looked_at > budget) return std::nullopt;
     }
-    std::ranges::sort(out, [](const Piercing& l, const Piercing& r) {
-        return std::tie(l.line, l.along, l.triangle) < std::tie(r.line, r.along, r.triangle);
-    });
-    return out;
+    return sorted(out, points.size());
 }
 
 } // namespace porthole

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -27,12 +28,13 @@ struct Piercing {
 ///
 /// @param wanted     by triangle, 0: leave it out; empty: all are wanted.
 /// @param direction  unit length, the mesh's coordinates.
-/// @param budget     the most pairs of triangle and line to look at.
+/// @param budget     the most pairs of triangle and line to look at; a piercing counts for nine.
+/// @param from       piercings nearer along the line than this are left out.
 /// @return nothing if the budget did not suffice.
 /// Cost: linear in triangles for small ones, as each looks only at lines near it; about 0.03 s
 /// per million triangles and some hundred lines.
-[[nodiscard]] std::optional<std::vector<Piercing>> find_piercings(const Mesh& mesh,
-                                                                  std::span<const std::uint8_t> wanted, Vec3d direction,
-                                                                  std::span<const Vec3d> points, std::uint64_t budget);
+[[nodiscard]] std::optional<std::vector<Piercing>> find_piercings(
+    const Mesh& mesh, std::span<const std::uint8_t> wanted, Vec3d direction, std::span<const Vec3d> points,
+    std::uint64_t budget, double from = -std::numeric_limits<double>::infinity());
 
 } // namespace porthole

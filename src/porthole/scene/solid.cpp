@@ -17,6 +17,10 @@ constexpr std::uint64_t kPairsPerTriangle = 32, kLeastPairs = 20'000'000;
 constexpr std::size_t kMostSamples = 200'000; ///< points that nesting looks at
 constexpr std::size_t kSamplesPerPiece = 7;
 constexpr std::uint32_t kNoTriangle = 0xFFFFFFFFu;
+/// Of the lines that nesting looks along: no axis, for models repeat things along axes.
+constexpr Vec3d kNestingDirections[] = {{0.61, 0.74, 0.28}, {-0.81, 0.29, 0.51}, {0.19, -0.62, 0.76}};
+/// Enough for closed pieces, on which lines never fail.
+constexpr std::span<const Vec3d> kOneDirection(kNestingDirections, 1);
 
 std::uint64_t pair_budget(const Mesh& mesh) {
     return std::max(kLeastPairs, kPairsPerTriangle * std::uint64_t(mesh.triangles.size()));
@@ -25,6 +29,7 @@ std::uint64_t pair_budget(const Mesh& mesh) {
 struct Corners {
     Vec3d a, b, c;
     [[nodiscard]] Vec3d normal() const { return cross(b - a, c - a); } ///< twice the area long
+    [[nodiscard]] Vec3d center() const { return (a + b + c) * (1.0 / 3); }
 };
 
 Corners corners_of(const Mesh& mesh, std::uint32_t triangle) {
@@ -75,12 +80,26 @@ std::vector<Measures> measure(const Mesh& mesh, const Pieces& pieces) {
         const Vec3d ab = t.b - t.a, bc = t.c - t.b, ca = t.a - t.c;
         if (!(twice_area > 1e-6 * std::max({dot(ab, ab), dot(bc, bc), dot(ca, ca)}))) continue;
         m.offer(0, twice_area, i);
+        const Vec3d center = t.center();
         for (int axis = 0; axis < 3; ++axis) {
-            m.offer(std::size_t(1 + 2 * axis), -std::min({t.a[axis], t.b[axis], t.c[axis]}), i);
-            m.offer(std::size_t(2 + 2 * axis), std::max({t.a[axis], t.b[axis], t.c[axis]}), i);
+            m.offer(std::size_t(1 + 2 * axis), -center[axis], i);
+            m.offer(std::size_t(2 + 2 * axis), center[axis], i);
         }
     }
     return out;
+}
+
+/// Strictly: nothing touches.
+bool lies_in(const Bounds3d& inner, const Bounds3d& outer) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (!(inner.lower[axis] > outer.lower[axis] && inner.upper[axis] < outer.upper[axis])) return false;
+    return true;
+}
+
+bool may_lie_in(const Bounds3d& inner, const Bounds3d& outer) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (inner.lower[axis] < outer.lower[axis] || inner.upper[axis] > outer.upper[axis]) return false;
+    return true;
 }
 
 /// What find_solid() makes of the pieces.
@@ -90,11 +109,21 @@ enum class Role : std::uint8_t {
     ignored ///< bounds nothing and opens nothing: copies, flat sheets, needles
 };
 
+/// Calls body(value, how many) for the runs of equal values.
+template <typename Body> void for_each_run(std::span<const std::uint32_t> values, Body&& body) {
+    for (std::size_t i = 0; i < values.size();) {
+        std::size_t end = i;
+        while (end < values.size() && values[end] == values[i]) ++end;
+        body(values[i], end - i);
+        i = end;
+    }
+}
+
 /// A point just outside a closed piece, next to the triangle of a sample slot: outside, so that
 /// of pieces that touch or coincide none lies in the other.
 Vec3d sample_point(const Mesh& mesh, const Measures& m, std::size_t slot) {
     const Corners t = corners_of(mesh, m.sample[slot]);
-    Vec3d p = (t.a + t.b + t.c) * (1.0 / 3);
+    Vec3d p = t.center();
     if (slot > 0) {
         const int axis = int(slot - 1) / 2;
         const double sign = slot % 2 == 1 ? -1 : 1;
@@ -105,33 +134,43 @@ Vec3d sample_point(const Mesh& mesh, const Measures& m, std::size_t slot) {
     return p + normalize(t.normal()) * std::copysign(5 * m.least_length(), m.volume);
 }
 
-/// Around each point the labels whose triangles enclose it: those that the half line from it
-/// leaves more or less often than it enters them. Nothing if that is too much work.
+/// Around each point the labels whose triangles enclose it: those that, in most of the
+/// directions, the half line from it leaves more or less often than it enters them. Nothing if
+/// that is too much work.
 /// @param label  by triangle; kNoPiece: not looked at.
 std::optional<std::vector<std::vector<std::uint32_t>>> find_enclosing(const Mesh& mesh,
                                                                       const std::vector<std::uint32_t>& label,
-                                                                      std::span<const Vec3d> points, Vec3d direction) {
+                                                                      std::span<const Vec3d> points,
+                                                                      std::span<const Vec3d> directions) {
     std::vector<std::uint8_t> wanted(label.size());
     std::ranges::transform(label, wanted.begin(), [](std::uint32_t l) { return std::uint8_t(l != kNoPiece); });
-    const auto piercings = find_piercings(mesh, wanted, direction, points, pair_budget(mesh));
-    if (!piercings) return std::nullopt;
-
     std::vector<std::vector<std::uint32_t>> out(points.size());
     std::vector<std::pair<std::uint32_t, int>> crossed; // label, sign
-    for (std::size_t i = 0; i < piercings->size();) {
-        const std::uint32_t line = (*piercings)[i].line;
-        crossed.clear();
-        for (; i < piercings->size() && (*piercings)[i].line == line; ++i) {
-            const Piercing& p = (*piercings)[i];
-            if (p.along > 0) crossed.emplace_back(label[p.triangle], p.entering ? -1 : 1);
+    for (const Vec3d direction : directions) {
+        const auto piercings = find_piercings(mesh, wanted, normalize(direction), points, pair_budget(mesh), 0);
+        if (!piercings) return std::nullopt;
+        for (std::size_t i = 0; i < piercings->size();) {
+            const std::uint32_t line = (*piercings)[i].line;
+            crossed.clear();
+            for (; i < piercings->size() && (*piercings)[i].line == line; ++i)
+                crossed.emplace_back(label[(*piercings)[i].triangle], (*piercings)[i].entering ? -1 : 1);
+            std::ranges::sort(crossed);
+            for (std::size_t k = 0; k < crossed.size();) {
+                const std::uint32_t l = crossed[k].first;
+                int winding = 0;
+                for (; k < crossed.size() && crossed[k].first == l; ++k) winding += crossed[k].second;
+                if (winding != 0) out[line].push_back(l);
+            }
         }
-        std::ranges::sort(crossed);
-        for (std::size_t k = 0; k < crossed.size();) {
-            const std::uint32_t l = crossed[k].first;
-            int winding = 0;
-            for (; k < crossed.size() && crossed[k].first == l; ++k) winding += crossed[k].second;
-            if (winding != 0) out[line].push_back(l);
-        }
+    }
+    if (directions.size() == 1) return out;
+    for (std::vector<std::uint32_t>& around : out) {
+        std::ranges::sort(around);
+        std::vector<std::uint32_t> kept;
+        for_each_run(around, [&](std::uint32_t l, std::size_t times) {
+            if (2 * times > directions.size()) kept.push_back(l);
+        });
+        around = std::move(kept);
     }
     return out;
 }
@@ -166,32 +205,32 @@ std::vector<std::uint32_t> bounding_labels(const Pieces& pieces, const std::vect
 }
 
 /// How many other bounding pieces each of them lies in, by piece; nothing if that is too much
-/// work. A piece lies in another if all its samples do.
+/// work. A piece lies in another if its box and all its samples do.
+/// @param directions  in which to look; more than one for pieces that edges do not close.
 std::optional<std::vector<std::uint32_t>> find_nesting(const Mesh& mesh, const Pieces& pieces,
                                                        const std::vector<Measures>& measures,
-                                                       const std::vector<Role>& role) {
+                                                       const std::vector<Role>& role,
+                                                       std::span<const Vec3d> directions) {
     std::vector<std::uint32_t> depth(role.size(), 0), chosen;
     for (std::uint32_t i = 0; i < role.size(); ++i)
         if (role[i] == Role::bounding) chosen.push_back(i);
     if (chosen.size() < 2) return depth;
     const std::optional<Samples> samples = take_samples(mesh, measures, chosen);
     if (!samples) return std::nullopt;
-    const auto enclosing = find_enclosing(mesh, bounding_labels(pieces, role), samples->points, {1, 0, 0});
+    const auto enclosing = find_enclosing(mesh, bounding_labels(pieces, role), samples->points, directions);
     if (!enclosing) return std::nullopt;
 
     std::vector<std::uint32_t> around; // all samples of one piece
     for (std::size_t i = 0; i < samples->points.size();) {
         const std::uint32_t piece = samples->piece[i];
         around.clear();
-        std::ptrdiff_t own = 0;
+        std::size_t own = 0;
         for (; i < samples->points.size() && samples->piece[i] == piece; ++i, ++own)
             around.insert(around.end(), (*enclosing)[i].begin(), (*enclosing)[i].end());
         std::ranges::sort(around);
-        for (auto run = around.begin(); run != around.end();) {
-            const auto end = std::find_if(run, around.end(), [&](std::uint32_t l) { return l != *run; });
-            if (*run != piece && end - run == own) ++depth[piece];
-            run = end;
-        }
+        for_each_run(around, [&](std::uint32_t other, std::size_t times) {
+            if (other != piece && times == own && lies_in(measures[piece].box, measures[other].box)) ++depth[piece];
+        });
     }
     return depth;
 }
@@ -300,7 +339,7 @@ std::optional<RayTest> test_by_rays(const Mesh& mesh, const Pieces& pieces, cons
     if (std::ranges::find(role, Role::bounding) != role.end()) {
         through.clear();
         for (const SurfacePoint& p : points) through.push_back(p.position + p.normal * (5 * same_place));
-        const auto enclosing = find_enclosing(mesh, bounding_labels(pieces, role), through, {1, 0, 0});
+        const auto enclosing = find_enclosing(mesh, bounding_labels(pieces, role), through, kOneDirection);
         if (!enclosing) return std::nullopt;
         const auto odd = std::ranges::count_if(*enclosing, [](const auto& around) { return around.size() % 2 == 1; });
         out.within = double(odd) / double(points.size());
@@ -321,22 +360,40 @@ std::optional<std::vector<std::uint8_t>> find_within_open(const Mesh& mesh, cons
     std::vector<std::uint32_t> label = pieces.of_triangle;
     for (std::uint32_t& l : label)
         if (l != kNoPiece) l = role[l] == Role::open ? 0 : kNoPiece;
-    std::vector<int> votes(samples->points.size(), 0);
-    for (const Vec3d direction : {Vec3d{0.61, 0.74, 0.28}, Vec3d{-0.81, 0.29, 0.51}, Vec3d{0.19, -0.62, 0.76}}) {
-        const auto enclosing = find_enclosing(mesh, label, samples->points, normalize(direction));
-        if (!enclosing) return std::nullopt;
-        for (std::size_t i = 0; i < votes.size(); ++i) votes[i] += !(*enclosing)[i].empty();
-    }
+    const auto enclosing = find_enclosing(mesh, label, samples->points, kNestingDirections);
+    if (!enclosing) return std::nullopt;
     for (const std::uint32_t piece : chosen) within[piece] = 1;
-    for (std::size_t i = 0; i < votes.size(); ++i)
-        if (votes[i] < 2) within[samples->piece[i]] = 0;
+    for (std::size_t i = 0; i < enclosing->size(); ++i)
+        if ((*enclosing)[i].empty()) within[samples->piece[i]] = 0;
     return within;
 }
 
-bool lies_in(const Bounds3d& inner, const Bounds3d& outer) {
-    for (int axis = 0; axis < 3; ++axis)
-        if (inner.lower[axis] < outer.lower[axis] || inner.upper[axis] > outer.upper[axis]) return false;
-    return true;
+/// Tests the open pieces one by one. Those are surfaces with pinholes, not faces of a solid,
+/// when each of them closes by rays alone: then they may nest as closed ones do.
+/// @return the lines that speak for it, of all pieces; nothing unless all pieces close.
+///         `measures` then has volumes of the sign that the lines say.
+std::optional<Balance> test_each_by_rays(const Mesh& mesh, const Pieces& pieces, const std::vector<Role>& role,
+                                         std::vector<Measures>& measures) {
+    constexpr std::size_t kMostPieces = 64;
+    std::vector<std::uint32_t> chosen;
+    for (std::uint32_t i = 0; i < role.size(); ++i)
+        if (role[i] == Role::open) chosen.push_back(i);
+    if (chosen.size() > kMostPieces) return std::nullopt;
+    Balance all;
+    std::vector<bool> outward;
+    for (const std::uint32_t piece : chosen) {
+        std::vector<Role> alone(role.size(), Role::ignored);
+        alone[piece] = Role::open;
+        const std::optional<RayTest> test = test_by_rays(mesh, pieces, alone);
+        if (!test) return std::nullopt;
+        const Balance& b = test->open;
+        if (!nearly_all(std::max(b.as_wound, b.turned), b.lines) || measures[piece].flat()) return std::nullopt;
+        outward.push_back(b.as_wound >= b.turned);
+        all.lines += b.lines, all.as_wound += std::max(b.as_wound, b.turned);
+    }
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+        measures[chosen[i]].volume = std::copysign(measures[chosen[i]].volume, outward[i] ? 1.0 : -1.0);
+    return all;
 }
 
 TriangleSide turned(TriangleSide side) {
@@ -345,19 +402,33 @@ TriangleSide turned(TriangleSide side) {
                                            : TriangleSide::outward;
 }
 
+/// Sides of the bounding pieces by their nesting, open for the others and if it is too much work.
+std::vector<TriangleSide> sides_by_nesting(const Mesh& mesh, const Pieces& pieces,
+                                           const std::vector<Measures>& measures, const std::vector<Role>& role,
+                                           std::span<const Vec3d> directions) {
+    std::vector<TriangleSide> side(role.size(), TriangleSide::open);
+    if (const auto depth = find_nesting(mesh, pieces, measures, role, directions))
+        for (std::size_t i = 0; i < role.size(); ++i)
+            if (role[i] == Role::bounding)
+                side[i] =
+                    (measures[i].volume > 0) == ((*depth)[i] % 2 == 0) ? TriangleSide::outward : TriangleSide::inward;
+    return side;
+}
+
 /// Judges the pieces that edges leave open, and those they close beside them.
 /// @param side  by piece; in: bounding ones by nesting, others open. Out: all.
-void judge_open_pieces(const Mesh& mesh, const Pieces& pieces, const std::vector<Measures>& measures,
+void judge_open_pieces(const Mesh& mesh, const Pieces& pieces, std::vector<Measures>& measures,
                        const std::vector<Role>& role, std::vector<TriangleSide>& side, MeshSolid& out) {
     Bounds3d open_box;
     for (std::size_t i = 0; i < role.size(); ++i)
         if (role[i] == Role::open) open_box.extend(measures[i].box);
     std::vector<std::uint32_t> in_box; // bounding pieces that the open ones may enclose
     bool mixed = false;
+    const bool several = std::ranges::count(role, Role::ignored) + 1 < std::ptrdiff_t(role.size());
     for (std::uint32_t i = 0; i < role.size(); ++i) {
         if (side[i] == TriangleSide::open) continue;
         mixed = true;
-        if (lies_in(measures[i].box, open_box)) in_box.push_back(i);
+        if (may_lie_in(measures[i].box, open_box)) in_box.push_back(i);
     }
     const std::optional<RayTest> test = test_by_rays(mesh, pieces, role);
     const auto close = [&](const Balance& balance, std::uint32_t wound, std::uint32_t turned_around) {
@@ -367,24 +438,41 @@ void judge_open_pieces(const Mesh& mesh, const Pieces& pieces, const std::vector
         return true;
     };
 
-    // The winding of the file makes sense of the whole.
-    if (test && mixed && close(test->whole, test->whole.single_wound, test->whole.single_turned)) {
-        const bool wound = test->whole.single_wound >= test->whole.single_turned;
-        for (std::size_t i = 0; i < role.size(); ++i)
-            if (role[i] != Role::ignored) side[i] = wound ? TriangleSide::outward : TriangleSide::inward;
-        return;
-    }
-    // The open pieces make sense by themselves, wholly inside or outside the material of the others.
-    const bool apart = test && (test->within <= 0.02 || test->within >= 0.98);
-    if (test && close(test->open, test->open.as_wound, test->open.turned) && apart) {
-        if (const auto within = find_within_open(mesh, pieces, measures, role, in_box)) {
-            const bool wound = test->open.as_wound >= test->open.turned, cavity = test->within > 0.5;
-            for (std::size_t i = 0; i < role.size(); ++i) {
-                if (role[i] == Role::open) side[i] = wound != cavity ? TriangleSide::outward : TriangleSide::inward;
-                if ((*within)[i]) side[i] = turned(side[i]);
+    if (test) {
+        const Balance& b = test->open;
+        const std::uint32_t best = std::max(b.as_wound, b.turned), single = std::max(b.single_wound, b.single_turned);
+        const bool together = nearly_all(best, b.lines);
+        // Inside of something twice, or not balanced: bodies that overlap, or skins in each other?
+        if (several && (!together || single < best || mixed))
+            if (const auto each = test_each_by_rays(mesh, pieces, role, measures)) {
+                close(*each, each->as_wound, 0);
+                std::vector<Role> all = role;
+                std::ranges::replace(all, Role::open, Role::bounding);
+                side = sides_by_nesting(mesh, pieces, measures, all, kNestingDirections);
+                return;
             }
+        // They make sense together, wholly inside or outside the material of the others.
+        const bool apart = test->within <= 0.02 || test->within >= 0.98;
+        const bool one_layer = 100 * single >= 80 * b.lines;
+        if (together && apart && one_layer)
+            if (const auto within = find_within_open(mesh, pieces, measures, role, in_box)) {
+                close(b, b.as_wound, b.turned);
+                const bool wound = b.as_wound >= b.turned, cavity = test->within > 0.5;
+                for (std::size_t i = 0; i < role.size(); ++i) {
+                    if (role[i] == Role::open) side[i] = wound != cavity ? TriangleSide::outward : TriangleSide::inward;
+                    if ((*within)[i]) side[i] = turned(side[i]);
+                }
+                return;
+            }
+        // The winding of the file makes sense of the whole, as when some of them line cavities of the others.
+        const Balance& w = test->whole;
+        if (mixed && close(w, w.single_wound, w.single_turned)) {
+            const bool wound = w.single_wound >= w.single_turned;
+            for (std::size_t i = 0; i < role.size(); ++i)
+                if (role[i] != Role::ignored) side[i] = wound ? TriangleSide::outward : TriangleSide::inward;
             return;
         }
+        out.lines = b.lines, out.balanced_lines = best;
     }
     out.by = ClosedBy::nothing;
     for (const std::uint32_t i : in_box) side[i] = TriangleSide::open;
@@ -403,7 +491,7 @@ MeshSolid find_solid(const Mesh& mesh) {
                 .edges = {.closed = true}};
     const Pieces pieces = find_pieces(mesh);
     const std::size_t count = pieces.kind.size();
-    const std::vector<Measures> measures = measure(mesh, pieces);
+    std::vector<Measures> measures = measure(mesh, pieces);
     std::vector<Role> role(count, Role::ignored);
     for (std::size_t i = 0; i < count; ++i) {
         if (pieces.kind[i] == PieceKind::closed && !measures[i].flat()) role[i] = Role::bounding;
@@ -412,12 +500,7 @@ MeshSolid find_solid(const Mesh& mesh) {
 
     MeshSolid out;
     out.edges = pieces.edges;
-    std::vector<TriangleSide> side(count, TriangleSide::open);
-    if (const auto depth = find_nesting(mesh, pieces, measures, role))
-        for (std::size_t i = 0; i < count; ++i)
-            if (role[i] == Role::bounding)
-                side[i] =
-                    (measures[i].volume > 0) == ((*depth)[i] % 2 == 0) ? TriangleSide::outward : TriangleSide::inward;
+    std::vector<TriangleSide> side = sides_by_nesting(mesh, pieces, measures, role, kOneDirection);
     if (std::ranges::find(role, Role::open) != role.end()) judge_open_pieces(mesh, pieces, measures, role, side, out);
 
     for (std::size_t i = 0; i < count; ++i) {
