@@ -57,6 +57,19 @@ void add_model(CLI::App& app, CommonOptions& o) {
         ->required();
 }
 
+void add_running(CLI::App& app, CommonOptions& o) {
+    app.option_defaults()->group("Running");
+    app.add_option("--threads", o.threads, "Threads (default: one per processor)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1024));
+    add_read(app, "--max-memory", "Most memory to take, such as 4G; exit 5 beyond it", "BYTES",
+             [&o](const std::string& text, const std::string& option) { o.max_memory = parse_bytes(text, option); });
+    app.add_flag("--quiet", o.quiet, "Say nothing but warnings and errors");
+    app.add_flag("--verbose", o.verbose, "Say more");
+    add_choice<std::string>(app, "--log", o.log, {{"text", "text"}, {"json", "json"}},
+                            "How messages are written to standard error");
+}
+
 void add_common(CLI::App& app, CommonOptions& o) {
     app.option_defaults()->group("Reading");
     add_read(app, "--format", "Format of the model, whatever its name", "glb|gltf|obj|ply|scene|stl",
@@ -78,16 +91,7 @@ void add_common(CLI::App& app, CommonOptions& o) {
     app.add_option("--time", o.load.time, "Seconds into the first animation (default: rest pose)")
         ->type_name("SECONDS")
         ->check(CLI::Range(0.0, 1e6));
-    app.option_defaults()->group("Running");
-    app.add_option("--threads", o.threads, "Threads (default: one per processor)")
-        ->type_name("N")
-        ->check(CLI::Range(1, 1024));
-    add_read(app, "--max-memory", "Most memory to take, such as 4G; exit 5 beyond it", "BYTES",
-             [&o](const std::string& text, const std::string& option) { o.max_memory = parse_bytes(text, option); });
-    app.add_flag("--quiet", o.quiet, "Say nothing but warnings and errors");
-    app.add_flag("--verbose", o.verbose, "Say more");
-    add_choice<std::string>(app, "--log", o.log, {{"text", "text"}, {"json", "json"}},
-                            "How messages are written to standard error");
+    add_running(app, o);
 }
 
 void add_camera(CLI::App& app, CameraParams& c) {
@@ -165,12 +169,13 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
         {{"cutaway", HoleStyle::cutaway}, {"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
         "cutaway: a readable window with a chamfered rim; hole: straight walls along the outline; paper: as the "
         "paper builds it (default cutaway)");
-    add_choice<HoleShape>(app, "--shape", o.plan.shape,
-                          {{"smooth", HoleShape::smooth},
-                           {"silhouette", HoleShape::silhouette},
-                           {"hull", HoleShape::hull},
-                           {"box", HoleShape::box}},
-                          "Outline of a cutaway: the targets' own, smoothed, their convex hull or box (default smooth)");
+    add_choice<HoleShape>(
+        app, "--shape", o.plan.shape,
+        {{"smooth", HoleShape::smooth},
+         {"silhouette", HoleShape::silhouette},
+         {"hull", HoleShape::hull},
+         {"box", HoleShape::box}},
+        "Outline of a cutaway: the targets' own, smoothed, their convex hull or box (default smooth)");
     add_read(app, "--bevel", "Width of a cutaway's chamfer; 0: straight walls (default: as the wall is thick)",
              "N[px|%|mm]",
              [&o](const std::string& text, const std::string& option) { o.plan.bevel = parse_length(text, option); });
@@ -232,6 +237,22 @@ void add_parts(CLI::App& app, PartsOptions& o) {
     app.footer("Examples:\n"
                "  porthole parts engine.glb\n"
                "  porthole parts engine.glb --json | jq -r '.parts[] | select(.closed | not) | .path'");
+}
+
+void add_check(CLI::App& app, CheckOptions& o) {
+    app.add_option("REPORT", o.report, "The report that reveal or render wrote; - reads standard input")
+        ->type_name("FILE")
+        ->required();
+    app.add_option("--model", o.common.model, "The model, if it is no longer where the report says")->type_name("FILE");
+    app.add_option("--picture", o.picture, "The picture, if it is no longer where the report says")->type_name("FILE");
+    app.add_flag("--json", o.json, "What was found as JSON")->group("Output");
+    add_running(app, o.common);
+    app.footer(
+        "Traces the reported view again, densely, and draws both pictures again. Prints each thing that differs:\n"
+        "what, where, reported, found. Exit 0 if nothing differs, 9 if something does.\n\n"
+        "Examples:\n"
+        "  porthole reveal engine.glb --target 'rod*' -o rods.png --report rods.json\n"
+        "  porthole check rods.json");
 }
 
 /// Gives the keys of a --config file to the subcommand that was called. Keys of the other
@@ -305,6 +326,7 @@ struct CommandLine {
     RevealOptions reveal;
     RenderOptions render;
     PartsOptions parts;
+    CheckOptions check;
 };
 
 /// Where pictures go when -o is not given.
@@ -327,6 +349,7 @@ int run(const CLI::App& app, CommandLine& line, Output& out, const std::stop_tok
         default_output(line.render.picture);
         return run_render(line.render, out, start(line.render.common));
     }
+    if (app.got_subcommand("check")) return run_check(line.check, out, start(line.check.common));
     return run_parts(line.parts, out, start(line.parts.common));
 }
 
@@ -342,7 +365,7 @@ int parse_and_run(int argc, char** argv, Output& out, const std::stop_token& sto
                "porthole COMMAND --help lists the options of a command; --config FILE reads options from JSON:\n"
                "  { \"size\": \"1280x720\", \"target\": [\"rod*\"], \"no-shadows\": true }\n\n"
                "Exit codes: 0 done, 1 a bug, 2 usage, 3 input, 4 output, 5 a limit, 8 nothing revealed,\n"
-               "130 and 143 interrupted.");
+               "9 check found differences, 130 and 143 interrupted.");
     app.set_config("--config", "", "Read options from a JSON file; the command line wins");
     app.config_formatter(std::make_shared<JsonConfig>(app));
     const auto command = [&](const char* name, const char* help) {
@@ -353,6 +376,7 @@ int parse_and_run(int argc, char** argv, Output& out, const std::stop_token& sto
     add_reveal(*command("reveal", "Open a hole so that parts inside can be seen"), line.reveal);
     add_render(*command("render", "Draw the plain picture"), line.render);
     add_parts(*command("parts", "List the parts: ids, triangles, closed or open, size"), line.parts);
+    add_check(*command("check", "Trace a report's view again and compare"), line.check);
     try {
         app.parse(argc, argv);
     } catch (const CLI::Success& e) { // --help, --version

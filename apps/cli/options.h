@@ -60,6 +60,13 @@ struct PartsOptions {
     bool json = false;
 };
 
+struct CheckOptions {
+    CommonOptions common; ///< its model may be empty: the one that the report names
+    std::string report;   ///< path, or "-"
+    std::string picture;  ///< empty: the one that the report names
+    bool json = false;
+};
+
 /// Readers of single values. `option` is named by the error.
 /// @throws Error usage E0105.
 [[nodiscard]] Vec2i parse_size(const std::string& text, const std::string& option); ///< "1920x1080", 1..32768 each

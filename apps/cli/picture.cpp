@@ -25,11 +25,6 @@ std::string lower_extension(const std::string& path) {
     return extension;
 }
 
-bool is_jpeg(const std::string& path) {
-    const std::string extension = lower_extension(path);
-    return extension == ".jpg" || extension == ".jpeg";
-}
-
 void check_writable(const std::string& path, bool no_clobber) {
     if (path.empty() || path == "-") return;
     std::error_code ignored;
@@ -44,6 +39,20 @@ void check_writable(const std::string& path, bool no_clobber) {
 }
 
 } // namespace
+
+bool is_jpeg(const std::string& path) {
+    const std::string extension = lower_extension(path);
+    return extension == ".jpg" || extension == ".jpeg";
+}
+
+void check_size(Vec2i size, std::uint64_t max_memory, const std::string& where) {
+    const std::uint64_t needed = std::uint64_t(size.x) * std::uint64_t(size.y) * kBytesPerPixel;
+    if (needed > max_memory)
+        throw Error(ErrorKind::limit, "E0901", where,
+                    std::to_string(size.x) + 'x' + std::to_string(size.y) + " needs about " +
+                        std::to_string(needed >> 20) + " MB, " + std::to_string(max_memory >> 20) +
+                        " MB are allowed (--max-memory)");
+}
 
 bool asks_for_report(const PictureOptions& options) { return options.json || !options.report_path.empty(); }
 
@@ -66,12 +75,7 @@ void check_outputs(const PictureOptions& options, std::uint64_t max_memory) {
     if (out == "-" && ::isatty(STDOUT_FILENO) == 1)
         throw usage("E0107", "--output -", "standard output is a terminal; send the PNG to a file or a pipe");
 
-    const std::uint64_t pixels = std::uint64_t(options.size.x) * std::uint64_t(options.size.y);
-    if (pixels * kBytesPerPixel > max_memory)
-        throw Error(ErrorKind::limit, "E0901", "--size",
-                    std::to_string(options.size.x) + 'x' + std::to_string(options.size.y) + " needs about " +
-                        std::to_string(pixels * kBytesPerPixel >> 20) + " MB, " + std::to_string(max_memory >> 20) +
-                        " MB are allowed (--max-memory)");
+    check_size(options.size, max_memory, "--size");
     check_writable(out, options.no_clobber);
     check_writable(options.report_path, options.no_clobber);
 }

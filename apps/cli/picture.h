@@ -5,6 +5,12 @@
 
 namespace porthole::cli {
 
+/// Whether a file of this name is written as JPEG.
+[[nodiscard]] bool is_jpeg(const std::string& path);
+
+/// @throws Error limit E0901 when a picture of this size does not fit into the memory allowed.
+void check_size(Vec2i size, std::uint64_t max_memory, const std::string& where);
+
 /// Whether anybody is going to read the report.
 [[nodiscard]] bool asks_for_report(const PictureOptions& options);
 

@@ -11,7 +11,7 @@ namespace porthole::cli {
 
 /// Exit codes, see DESIGN: errors of a kind, then outcomes.
 inline constexpr int kExitDone = 0, kExitBug = 1, kExitUsage = 2, kExitInput = 3, kExitOutput = 4, kExitLimit = 5,
-                     kExitNothingRevealed = 8;
+                     kExitNothingRevealed = 8, kExitDifferences = 9;
 [[nodiscard]] int exit_code(ErrorKind kind);
 
 /// Seconds since it was made.
@@ -45,5 +45,6 @@ void fill_report(Report& report, const char* command, const Scene& scene, const 
 int run_reveal(const RevealOptions& options, Output& out, const Control& control);
 int run_render(const RenderOptions& options, Output& out, const Control& control);
 int run_parts(const PartsOptions& options, Output& out, const Control& control);
+int run_check(const CheckOptions& options, Output& out, const Control& control);
 
 } // namespace porthole::cli

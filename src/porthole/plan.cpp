@@ -299,7 +299,7 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
                                        ? cutaway_margins(view, params, band)
                                        : CutawayMargins{hole_margin_px(band), hole_margin_px(band)};
     Windows windows;
-    windows.whole = view.window().grown(margins.hole);
+    windows.whole = plan.whole = view.window().grown(margins.hole);
     windows.all_targets = view.window().grown(margins.targets);
 
     // Each target alone, then all of them together.

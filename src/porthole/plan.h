@@ -92,6 +92,7 @@ struct TargetView {
 struct ViewPlan {
     View view;
     int depth_px = 0;                ///< width of the band asked for
+    Rect whole;                      ///< picture and margin
     Rect window;                     ///< the part of picture and margin that the hole can touch; all images below
     std::vector<TargetView> targets; ///< in the order of Subject::targets
     std::vector<PartId> opened;      ///< targets neither absent nor refused

@@ -208,6 +208,7 @@ Report read_report(std::string_view text, const std::string& where) {
     report.model.up = up[0];
     report.model.metres_per_unit = model["metres_per_unit"].number(1e-300, 1e300);
 
+    report.camera = root["camera"]["name"].text();
     report.view = read_view(root["camera"], root["size"]);
     read_options(root["options"], report);
     report.options.view = report.view;

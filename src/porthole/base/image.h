@@ -71,7 +71,7 @@ struct Rgba8 {
 
 /// Values of a file's channels, of 8 or 16 bits.
 struct Rgba16 {
-    std::uint16_t r = 0, g = 0, b = 0, a = 65535;
+    std::uint16_t r = 0, g = 0, b = 0, a = 0;
     friend constexpr bool operator==(const Rgba16&, const Rgba16&) = default;
 };
 

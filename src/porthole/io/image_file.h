@@ -35,6 +35,11 @@ struct ImageInfo {
 [[nodiscard]] Image<Rgba8> decode_image(std::span<const std::byte> bytes, const std::string& where,
                                         Warnings* warnings = nullptr);
 
+/// The channel values that a PNG or another picture holds: of 16 bits if it is a 16-bit PNG,
+/// else of 8 (alpha is then 255 where there is none).
+/// @throws Error as decode_image.
+[[nodiscard]] Image<Rgba16> decode_values(std::span<const std::byte> bytes, const std::string& where);
+
 /// PNG of straight-alpha sRGB pixels. `channels` 3 drops alpha. Same bytes every time.
 /// @throws Error output E0804 when the image is empty or too large for a PNG.
 [[nodiscard]] std::vector<std::byte> encode_png(const Image<Rgba8>& image, int channels);

@@ -2,6 +2,7 @@
 #include <turbojpeg.h>
 #include <webp/decode.h>
 
+#include <algorithm>
 #include <array>
 #include <csetjmp>
 #include <cstdio>
@@ -171,11 +172,13 @@ void png_read(png_structp png, png_bytep out, std::size_t size) {
     source->at += size;
 }
 
+enum class PngRows : std::uint8_t { palette, rgba8, rgba16 };
+
 /// The one function that libpng may jump out of: nothing in it has a destructor. Fills `height`
-/// rows of `row_bytes`: one palette index per pixel if `palette`, else RGBA.
+/// rows of `row_bytes`.
 /// @return false when source.error says why not.
 bool read_png_rows(PngSource& source, png_structp png, png_infop info, std::int32_t width, std::int32_t height,
-                   bool palette, std::uint8_t* rows, std::size_t row_bytes) {
+                   PngRows kind, std::uint8_t* rows, std::size_t row_bytes) {
     if (setjmp(source.give_up)) return false;
     png_set_read_fn(png, &source, png_read);
     png_set_user_limits(png, kMaxSide, kMaxSide);
@@ -184,13 +187,16 @@ bool read_png_rows(PngSource& source, png_structp png, png_infop info, std::int3
     if (std::int32_t(png_get_image_width(png, info)) != width ||
         std::int32_t(png_get_image_height(png, info)) != height)
         png_error(png, "two headers that differ");
-    if (palette) {
+    if (kind == PngRows::palette) {
         png_set_packing(png);
     } else {
         png_set_expand(png); // low bit depths to 8 bits, tRNS to alpha
-        png_set_scale_16(png);
+        if (kind == PngRows::rgba16)
+            png_set_swap(png); // to this machine's order
+        else
+            png_set_scale_16(png);
         png_set_gray_to_rgb(png);
-        png_set_add_alpha(png, 0xFF, PNG_FILLER_AFTER);
+        png_set_add_alpha(png, kind == PngRows::rgba16 ? 0xFFFF : 0xFF, PNG_FILLER_AFTER);
     }
     const int passes = png_set_interlace_handling(png);
     png_read_update_info(png, info);
@@ -229,26 +235,48 @@ std::vector<Rgba8> png_palette(png_structp png, png_infop info) {
     return palette;
 }
 
+/// libpng's state for one picture.
+struct PngReader {
+    std::unique_ptr<PngSource> source = std::make_unique<PngSource>();
+    png_structp png = nullptr;
+    png_infop info = nullptr;
+
+    PngReader(Bytes bytes, const std::string& where) {
+        check_png_chunks(bytes, where);
+        source->bytes = bytes;
+        png = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), png_failed, png_warned);
+        info = png ? png_create_info_struct(png) : nullptr;
+        if (info) return;
+        png_destroy_read_struct(&png, nullptr, nullptr);
+        throw std::bad_alloc();
+    }
+    ~PngReader() { png_destroy_read_struct(&png, &info, nullptr); }
+    PngReader(const PngReader&) = delete;
+    PngReader& operator=(const PngReader&) = delete;
+};
+
+Image<Rgba16> decode_png16(Bytes bytes, const std::string& where) {
+    const ImageInfo size = png_info(bytes, where);
+    PngReader reader(bytes, where);
+    Image<Rgba16> image(size.width, size.height);
+    if (!read_png_rows(*reader.source, reader.png, reader.info, size.width, size.height, PngRows::rgba16,
+                       reinterpret_cast<std::uint8_t*>(image.row(0)), std::size_t(size.width) * sizeof(Rgba16)))
+        broken(where, std::string("the PNG is damaged: ") + reader.source->error);
+    return image;
+}
+
 Image<Rgba8> decode_png(Bytes bytes, const std::string& where, Warnings* warnings) {
     const ImageInfo size = png_info(bytes, where);
-    check_png_chunks(bytes, where);
-    const auto source = std::make_unique<PngSource>();
-    source->bytes = bytes;
-    struct Reader {
-        png_structp png = nullptr;
-        png_infop info = nullptr;
-        ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
-    } reader;
-    reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, source.get(), png_failed, png_warned);
-    reader.info = reader.png ? png_create_info_struct(reader.png) : nullptr;
-    if (!reader.info) throw std::bad_alloc();
+    PngReader reader(bytes, where);
+    const PngSource* const source = reader.source.get();
 
     // libpng would draw indices beyond the palette as black; they are looked up here instead.
     const bool palette = big_endian(bytes, 25, 1) == PNG_COLOR_TYPE_PALETTE;
     Image<Rgba8> image(size.width, size.height);
     std::vector<std::uint8_t> indices(palette ? image.pixels().size() : 0);
     auto* const rows = palette ? indices.data() : reinterpret_cast<std::uint8_t*>(image.row(0));
-    if (!read_png_rows(*source, reader.png, reader.info, size.width, size.height, palette, rows,
+    if (!read_png_rows(*reader.source, reader.png, reader.info, size.width, size.height,
+                       palette ? PngRows::palette : PngRows::rgba8, rows,
                        std::size_t(size.width) * (palette ? 1 : sizeof(Rgba8))))
         broken(where, std::string("the PNG is damaged: ") + source->error);
     if (palette) {
@@ -370,6 +398,19 @@ Image<Rgba8> decode_image(Bytes bytes, const std::string& where, Warnings* warni
     case ImageKind::webp: break;
     }
     return decode_webp(bytes, where);
+}
+
+Image<Rgba16> decode_values(Bytes bytes, const std::string& where) {
+    if (image_kind(bytes, where) == ImageKind::png) {
+        (void)png_info(bytes, where);
+        if (big_endian(bytes, 24, 1) == 16) return decode_png16(bytes, where);
+    }
+    const Image<Rgba8> image = decode_image(bytes, where);
+    Image<Rgba16> values(image.window());
+    std::transform(image.pixels().begin(), image.pixels().end(), values.pixels().begin(), [](Rgba8 c) {
+        return Rgba16{c.r, c.g, c.b, c.a};
+    });
+    return values;
 }
 
 } // namespace porthole
