@@ -186,6 +186,21 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
         ->excludes("--bevel");
     add_choice<bool>(app, "--steps", o.plan.steps, {{"auto", true}, {"off", false}},
                      "Layers that enclose one another open in steps (default auto)");
+    add_read(app, "--cap", "How the cut through solid material is drawn (default own: the part's colour, set off)",
+             "own|hatch|tint:#rrggbb", [&o](const std::string& text, const std::string& option) {
+                 RenderParams& render = o.picture.render;
+                 if (text.rfind("tint:", 0) == 0) {
+                     render.cap = CapStyle::tint;
+                     render.cap_tint = parse_color(text.substr(5), option);
+                 } else if (text == "own" || text == "hatch") {
+                     render.cap = text == "own" ? CapStyle::own : CapStyle::hatch;
+                 } else {
+                     throw Error(ErrorKind::usage, "E0105", option,
+                                 "\"" + text.substr(0, 80) + "\" is not own, hatch or tint:#rrggbb");
+                 }
+             });
+    add_list(app, "--solid", o.solid, "Parts that are capped wherever they are cut, though they hold a target");
+    add_list(app, "--shell", o.shell, "Parts that are capped on the chamfer only, though they hold no target");
     add_choice<ContourMethod>(
         app, "--contours", o.plan.contours,
         {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},

@@ -38,7 +38,7 @@ struct PictureOptions {
 struct RevealOptions {
     CommonOptions common;
     PictureOptions picture;
-    std::vector<std::string> target, keep, cut_only; ///< selectors
+    std::vector<std::string> target, keep, cut_only, solid, shell; ///< selectors
     PlanParams plan;
     bool keep_see_through = false;
     bool strict = false;

@@ -93,6 +93,8 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
     params.camera = picture.camera;
     params.width = picture.size.x, params.height = picture.size.y;
     params.plan = options.plan;
+    params.plan.solidity.solid = select_and_tell(scene, options.solid, "--solid", out);
+    params.plan.solidity.shell = select_and_tell(scene, options.shell, "--shell", out);
     params.render = picture.render;
 
     const Stopwatch building;

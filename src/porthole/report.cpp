@@ -143,11 +143,14 @@ std::optional<double> wall_visible(const Subject& subject, const ViewPlan& plan,
             seen(x, y) = after.ids.depth(x, y);
         }
     const Bvh cut_set = build_bvh(*subject.meshes, plan.cut_set);
-    const Mask behind = trace_back_faces(cut_set, plan.view, band, from, seen, control);
+    Mask wall = trace_back_faces(cut_set, plan.view, band, from, seen, control);
+    for (int y = window.y0; y < window.y1; ++y)
+        for (int x = window.x0; x < window.x1; ++x)
+            if (after.inside.at_or(x, y, 0) == Frame::cap) wall(x, y) = 1;
     std::vector<Vec2i> covered;
     for (const BandPixel& c : plan.hole.band)
         if (c.covered && window.contains(c.pixel.x, c.pixel.y)) covered.push_back(c.pixel);
-    const std::vector<std::int64_t> distances = squared_distances(behind, covered);
+    const std::vector<std::int64_t> distances = squared_distances(wall, covered);
     const std::int64_t reach = std::int64_t(plan.depth_px) * plan.depth_px;
     return ratio(std::count_if(distances.begin(), distances.end(), [&](std::int64_t d) { return d <= reach; }),
                  std::int64_t(covered.size()));
