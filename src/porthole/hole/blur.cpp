@@ -1,6 +1,7 @@
 #include "porthole/hole/blur.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -143,21 +144,66 @@ template <typename Value> Image<double> sum_squares_twice(Rect read, int radius,
 
 } // namespace
 
-void smooth_over(std::span<Image<float>> maps, const Mask& known, Rect box, int radius) {
-    // What lies farther off is not read by the box's pixels; the sums just inside this edge are
-    // too small, and not used.
-    const Rect read = box.grown(2 * radius).intersected(known.window());
+void smooth_over(Image<float>& map, const Mask& known, Rect box, int radius, Fit fit) {
     box = box.intersected(known.window());
-    if (maps.empty() || box.empty()) return;
-    const Image<double> weights =
-        sum_squares_twice(read, radius, [&](std::int32_t x, std::int32_t y) { return known(x, y) ? 1.0 : 0.0; });
-    for (Image<float>& map : maps) {
-        const Image<double> sums = sum_squares_twice(
-            read, radius, [&](std::int32_t x, std::int32_t y) { return known(x, y) ? double(map(x, y)) : 0.0; });
-        for (std::int32_t y = box.y0; y < box.y1; ++y)
-            for (std::int32_t x = box.x0; x < box.x1; ++x)
-                map(x, y) = weights(x, y) > 0 ? float(sums(x, y) / weights(x, y)) : kInfinity;
-    }
+    if (box.empty()) return;
+    // The maps change little within a cell, so that sums over cells do.
+    const int cell = radius >= 16 ? 4 : radius >= 8 ? 2 : 1;
+    const int cells = std::max(1, (radius + cell / 2) / cell);
+    const auto cell_of = [&](std::int32_t p) { return p >= 0 ? p / cell : -((cell - 1 - p) / cell); };
+    const Rect wanted =
+        Rect{cell_of(box.x0), cell_of(box.y0), cell_of(box.x1 - 1) + 1, cell_of(box.y1 - 1) + 1}.grown(1);
+    const Rect read = wanted.grown(2 * cells);
+
+    // Of each cell's known pixels: how many, and the sums of v, x, y, xx, xy, yy, xv, yv.
+    constexpr int kMean = 2, kPlane = 9;
+    const int moments = fit == Fit::plane ? kPlane : kMean;
+    std::vector<Image<double>> sums{std::size_t(moments), Image<double>(read)};
+    const Rect pixels =
+        Rect{read.x0 * cell, read.y0 * cell, read.x1 * cell, read.y1 * cell}.intersected(known.window());
+    for (std::int32_t y = pixels.y0; y < pixels.y1; ++y)
+        for (std::int32_t x = pixels.x0; x < pixels.x1; ++x) {
+            if (!known(x, y)) continue;
+            const double v = map(x, y), dx = x, dy = y;
+            const double terms[kPlane] = {1, v, dx, dy, dx * dx, dx * dy, dy * dy, dx * v, dy * v};
+            const std::size_t at = sums[0].index(cell_of(x), cell_of(y));
+            for (int m = 0; m < moments; ++m) sums[std::size_t(m)].pixels()[at] += terms[m];
+        }
+    for (Image<double>& s : sums)
+        s = sum_squares_twice(read, cells, [&](std::int32_t x, std::int32_t y) { return s(x, y); });
+
+    // Values at the cells' centres, then between them.
+    Image<double> at_cell(wanted);
+    const double ridge = 0.02 * radius * radius;
+    for (std::int32_t y = wanted.y0; y < wanted.y1; ++y)
+        for (std::int32_t x = wanted.x0; x < wanted.x1; ++x) {
+            const auto s = [&](int m) { return sums[std::size_t(m)](x, y); };
+            const double n = s(0);
+            double& value = at_cell(x, y);
+            value = n > 0 ? s(1) / n : double(kInfinity);
+            if (!(n > 0) || fit != Fit::plane) continue;
+            const double mx = s(2) / n, my = s(3) / n;
+            const double xx = s(4) / n - mx * mx + ridge, xy = s(5) / n - mx * my, yy = s(6) / n - my * my + ridge;
+            const double xv = s(7) / n - mx * value, yv = s(8) / n - my * value;
+            const double determinant = xx * yy - xy * xy; // at least ridge^2
+            if (!(determinant > 0)) continue;
+            const double middle = 0.5 * (cell - 1);
+            value += ((xv * yy - yv * xy) * (x * cell + middle - mx) + (yv * xx - xv * xy) * (y * cell + middle - my)) /
+                     determinant;
+        }
+    for (std::int32_t y = box.y0; y < box.y1; ++y)
+        for (std::int32_t x = box.x0; x < box.x1; ++x) {
+            const double cx = (x - 0.5 * (cell - 1)) / cell, cy = (y - 0.5 * (cell - 1)) / cell;
+            const auto x0 = std::int32_t(std::floor(cx)), y0 = std::int32_t(std::floor(cy));
+            const double ax = cx - x0, ay = cy - y0;
+            double sum = 0, weights = 0;
+            for (int i = 0; i < 4; ++i) {
+                const double weight = (i & 1 ? ax : 1 - ax) * (i & 2 ? ay : 1 - ay);
+                const double value = at_cell(x0 + (i & 1), y0 + (i >> 1));
+                if (weight > 0 && value < double(kInfinity)) sum += weight * value, weights += weight;
+            }
+            map(x, y) = weights > 0 ? float(sum / weights) : kInfinity;
+        }
 }
 
 Image<float> blur_floor(Image<float> depth, const Mask& mask, const Image<PartId>& targets, Rect box, int radius,

@@ -1,9 +1,7 @@
 #include "porthole/hole/profile.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 
 #include "porthole/hole/blur.h"
 
@@ -24,7 +22,7 @@ Image<float> band_widths(const Hole& hole, int blur_px) {
     for (std::size_t i = 0; i < known.pixels().size(); ++i)
         known.pixels()[i] = hole.mask.pixels()[i] != 0 && hole.width.pixels()[i] > 0;
     Image<float> width = hole.width;
-    smooth_over(std::span(&width, 1), known, hole.bounds, blur_px);
+    smooth_over(width, known, hole.bounds, blur_px, Fit::mean);
     for (std::size_t i = 0; i < known.pixels().size(); ++i)
         if (known.pixels()[i]) width.pixels()[i] = std::min(width.pixels()[i], hole.width.pixels()[i]);
     return width;
@@ -39,14 +37,15 @@ std::vector<CutLevel> rim_levels(const Hole& hole, const View& view, std::span<c
     std::vector<CutLevel> levels;
     for (std::size_t k = 0; k < walls.size(); ++k) {
         const Wall& wall = walls[k];
-        std::array<Image<float>, 2> maps{wall.front, wall.next};
+        Image<float> fronts = wall.front, thicknesses = wall.next;
         Mask known(hole.window);
         for (std::size_t i = 0; i < known.pixels().size(); ++i) {
-            if (!hole.mask.pixels()[i] || !(maps[0].pixels()[i] < kInfinity)) continue;
+            if (!hole.mask.pixels()[i] || !(fronts.pixels()[i] < kInfinity)) continue;
             known.pixels()[i] = 1;
-            maps[1].pixels()[i] -= maps[0].pixels()[i];
+            thicknesses.pixels()[i] -= fronts.pixels()[i];
         }
-        smooth_over(maps, known, box, params.blur_px);
+        smooth_over(fronts, known, box, params.blur_px, Fit::plane);
+        smooth_over(thicknesses, known, box, params.blur_px, Fit::mean);
 
         CutLevel& level = levels.emplace_back(hole.window);
         for (int y = box.y0; y < box.y1; ++y)
@@ -57,9 +56,9 @@ std::vector<CutLevel> rim_levels(const Hole& hole, const View& view, std::span<c
                 const float step = width(x, y) / float(walls.size());
                 if (!(step < kInfinity)) continue;
                 p.start = float(k) * step;
-                const float front = maps[0](x, y);
+                const float front = fronts(x, y);
                 if (!(front < kInfinity)) continue;
-                const float pixel = view.pixel_size(front), thick = kThrough * maps[1](x, y);
+                const float pixel = view.pixel_size(front), thick = kThrough * thicknesses(x, y);
                 if (params.angle) {
                     p.width = kWholeStep * step;
                     p.slope = pixel / std::tan(*params.angle);
