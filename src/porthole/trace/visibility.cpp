@@ -20,6 +20,15 @@ template <typename Body> void for_each_block(Rect tile, Body&& body) {
         for (int bx = floor_div4(tile.x0); 4 * bx < tile.x1; ++bx) body(4 * bx, 4 * by);
 }
 
+/// Whether wanted(x, y) for some pixel of the 4x4 block that lies in `tile`.
+template <typename Wanted> bool any_in_block(Rect tile, int x0, int y0, const Wanted& wanted) {
+    const Rect block = Rect{x0, y0, x0 + 4, y0 + 4}.intersected(tile);
+    for (int y = block.y0; y < block.y1; ++y)
+        for (int x = block.x0; x < block.x1; ++x)
+            if (wanted(x, y)) return true;
+    return false;
+}
+
 /// Rays through the centres of a 4x4 block; lane i is pixel (x0 + i % 4, y0 + i / 4). Lanes
 /// outside `window` are inactive.
 /// @return number of active lanes
@@ -218,6 +227,7 @@ Spans trace_spans(const Bvh& bvh, std::uint32_t mask, const View& view, const Id
         std::vector<std::pair<PartId, int>> met; // part and lane, each pair once
         std::int64_t n = 0;
         for_each_block(tile, [&](int x0, int y0) {
+            if (!any_in_block(tile, x0, y0, [&](int x, int y) { return targets.id(x, y) != kNoPart; })) return;
             bool any = false;
             set_block_rays(packet, depth_per_t, view, x0, y0, tile, mask);
             for (int i = 0; i < kLanes; ++i) {
@@ -289,6 +299,7 @@ Image<float> trace_farthest(const Bvh& bvh, const View& view, const Mask& mask, 
         float depth_per_t[kLanes];
         std::int64_t n = 0;
         for_each_block(tile, [&](int x0, int y0) {
+            if (!any_in_block(tile, x0, y0, [&](int x, int y) { return mask(x, y) != 0; })) return;
             bool any = false;
             set_block_rays(packet, depth_per_t, view, x0, y0, tile);
             for (int i = 0; i < kLanes; ++i) {
@@ -323,6 +334,7 @@ Mask trace_beyond(const Bvh& bvh, const View& view, const Mask& mask, const Imag
         float depth_per_t[kLanes];
         std::int64_t n = 0;
         for_each_block(tile, [&](int x0, int y0) {
+            if (!any_in_block(tile, x0, y0, [&](int x, int y) { return mask(x, y) != 0; })) return;
             set_block_rays(packet, depth_per_t, view, x0, y0, tile);
             for (int i = 0; i < kLanes; ++i) {
                 if (!packet.active(i)) continue;
@@ -352,6 +364,7 @@ Mask trace_back_faces(const Bvh& bvh, const View& view, const Mask& mask, const 
         RayHit16 packet;
         float depth_per_t[kLanes];
         for_each_block(tile, [&](int x0, int y0) {
+            if (!any_in_block(tile, x0, y0, [&](int x, int y) { return mask(x, y) != 0; })) return;
             set_block_rays(packet, depth_per_t, view, x0, y0, tile);
             for (int i = 0; i < kLanes; ++i) {
                 if (!packet.active(i)) continue;
