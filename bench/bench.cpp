@@ -12,6 +12,7 @@
 #include <random>
 
 #include "bare_embree.h"
+#include "cut_frame.h"
 #include "porthole/io/load.h"
 #include "porthole/plan.h"
 #include "porthole/render/render.h"
@@ -115,6 +116,40 @@ void plain_frame(benchmark::State& state, const Named& named) {
         benchmark::DoNotOptimize(render(s.subject->whole, nullptr, s.view, {}, nullptr, nullptr, s.one_thread));
 }
 
+/// A cutaway with its yardsticks, planned when first asked for.
+struct CutStage {
+    CutFrame cut;
+    AbsentScene absent;
+    Frame around;
+    explicit CutStage(const Stage& s)
+        : cut(*s.subject, s.view), absent(cut), around(render_around(s.subject->whole, s.view, {}, cut.plan.cut)) {}
+};
+
+CutStage& cut_stage(const Named& named) {
+    static std::map<std::string, std::unique_ptr<CutStage>> stages;
+    std::unique_ptr<CutStage>& s = stages[named.name];
+    if (!s) s = std::make_unique<CutStage>(stage(named));
+    return *s;
+}
+
+void cutaway_frame(benchmark::State& state, const Named& named) {
+    const CutStage& c = cut_stage(named);
+    for (auto _ : state) benchmark::DoNotOptimize(c.cut.draw(true, {}, stage(named).one_thread));
+}
+
+/// The yardstick of cutaway_frame: the removed geometry is truly absent.
+void absent_frame(benchmark::State& state, const Named& named) {
+    const CutStage& c = cut_stage(named);
+    for (auto _ : state)
+        benchmark::DoNotOptimize(
+            render(*c.absent.bvh, nullptr, c.cut.view, {}, nullptr, nullptr, stage(named).one_thread));
+}
+
+void hole_pixels(benchmark::State& state, const Named& named, bool capped) {
+    const CutStage& c = cut_stage(named);
+    for (auto _ : state) benchmark::DoNotOptimize(c.cut.draw_hole(capped, {}, c.around, stage(named).one_thread));
+}
+
 void add_benchmarks(const Named& named) {
     const auto add = [&](const char* what, auto function) {
         benchmark::RegisterBenchmark((named.name + "/" + what).c_str(), function)->Unit(benchmark::kMillisecond);
@@ -125,6 +160,10 @@ void add_benchmarks(const Named& named) {
     add("targets_exact", [=](benchmark::State& s) { target_ids(s, named, true); });
     add("contours_paper", [=](benchmark::State& s) { paper_contours(s, named); });
     add("plan", [=](benchmark::State& s) { whole_plan(s, named); });
+    add("cutaway_frame", [named](benchmark::State& s) { cutaway_frame(s, named); });
+    add("absent_frame", [named](benchmark::State& s) { absent_frame(s, named); });
+    add("hole_capped", [named](benchmark::State& s) { hole_pixels(s, named, true); });
+    add("hole_uncapped", [named](benchmark::State& s) { hole_pixels(s, named, false); });
     add("plain_frame", [=](benchmark::State& s) { plain_frame(s, named); });
 }
 
