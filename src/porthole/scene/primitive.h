@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -93,16 +94,22 @@ struct PrimitiveCrossing {
     bool entering = true; ///< into the solid
 };
 
-/// All crossings of the whole line origin + t direction, by increasing t; entering and leaving
-/// alternate, beginning with entering. Material or gaps thinner than a billionth of the distance
-/// to the far side of the tree are left out where solids meet, so that faces in one plane leave
-/// no film.
+/// All crossings of the line origin + t direction with t in [t0, t1], by increasing t; entering
+/// and leaving alternate, on a whole line beginning with entering. Material or gaps thinner than a billionth of the
+/// distance to the far side of the tree are left out where solids meet, so that faces in one plane leave no film.
 /// @param direction  any finite length above 0.
 /// @param crossings  replaced; its memory is used again.
-/// The same line gives the same bits always: nothing but + - * / and square roots.
-/// Cost: about 30 ns a primitive whose box the line meets, a torus about ten times that.
-void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction,
+/// The same line gives the same bits always, whatever the stretch: nothing but + - * / and square roots.
+/// Cost: about 30 ns a primitive whose box the stretch meets, a torus about ten times that.
+void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction, double t0, double t1,
                     std::vector<PrimitiveCrossing>& crossings);
+
+/// The same of the whole line.
+inline void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction,
+                           std::vector<PrimitiveCrossing>& crossings) {
+    constexpr double kEver = std::numeric_limits<double>::infinity();
+    find_crossings(tree, origin, direction, -kEver, kEver, crossings);
+}
 
 /// A point of a surface: what a crossing becomes when only its surface and two numbers are kept.
 struct PrimitivePoint {

@@ -222,22 +222,27 @@ void add_crossings(const PrimitiveLeaf& leaf, Vec3d origin, Vec3d direction, std
     }
 }
 
-bool meets(const Bounds3d& box, Vec3d origin, Vec3d direction) {
-    if (box.empty()) return false;
-    double low = -std::numeric_limits<double>::infinity(), high = -low;
-    for (int axis = 0; axis < 3; ++axis) {
-        // Wider than rounding; a box too many only costs time.
-        const double slack = 1e-9 * (std::abs(box.lower[axis]) + std::abs(box.upper[axis]) + std::abs(origin[axis]));
-        const double from = box.lower[axis] - slack - origin[axis], to = box.upper[axis] + slack - origin[axis];
-        if (direction[axis] == 0) {
-            if (from > 0 || to < 0) return false;
-            continue;
-        }
-        const double a = from / direction[axis], b = to / direction[axis];
-        low = std::max(low, std::min(a, b)), high = std::min(high, std::max(a, b));
+/// A stretch of a line, ready for boxes.
+struct Segment {
+    Vec3d origin, per_direction;
+    double t0, t1;
+    Segment(Vec3d o, Vec3d d, double from, double to) : origin(o), t0(from), t1(to) {
+        // A finite number for lines in a box's plane: 0 times infinity would be no number.
+        for (int axis = 0; axis < 3; ++axis) per_direction[axis] = std::abs(d[axis]) > 1e-300 ? 1 / d[axis] : 1e300;
     }
-    return low <= high;
-}
+    [[nodiscard]] bool meets(const Bounds3d& box) const {
+        double low = t0, high = t1;
+        for (int axis = 0; axis < 3; ++axis) {
+            // Wider than rounding; a box too many only costs time.
+            const double slack =
+                1e-9 * (std::abs(box.lower[axis]) + std::abs(box.upper[axis]) + std::abs(origin[axis]));
+            const double a = (box.lower[axis] - slack - origin[axis]) * per_direction[axis];
+            const double b = (box.upper[axis] + slack - origin[axis]) * per_direction[axis];
+            low = std::max(low, std::min(a, b)), high = std::min(high, std::max(a, b));
+        }
+        return low <= high;
+    }
+};
 
 /// Added to the surface numbers of all children but the first while their parent waits for them.
 constexpr std::uint32_t kOther = 0x80000000u;
@@ -287,17 +292,21 @@ struct Pending {
 
 } // namespace
 
-void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction, std::vector<PrimitiveCrossing>& list) {
+void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction, double t0, double t1,
+                    std::vector<PrimitiveCrossing>& list) {
     list.clear();
     const Bounds3d box = tree.bounds();
     if (box.empty()) return;
     const double tolerance = kCoincident * (length(box.center() - origin) + 0.5 * box.diagonal()) / length(direction);
+    // A solid whose box the stretch does not touch is not there; what may coincide with
+    // something at the ends of the stretch is.
+    const Segment segment(origin, direction, t0 - 2 * tolerance, t1 + 2 * tolerance);
     std::array<Pending, kMaxTreeDepth> open;
     std::size_t depth = 0;
     for (std::uint32_t i = 0;;) {
         const PrimitiveNode& node = tree.nodes[i];
         std::size_t begin = list.size();
-        if (meets(node.box, origin, direction)) {
+        if (!node.box.empty() && segment.meets(node.box)) {
             if (node.operation != CsgOperation::leaf) {
                 open[depth++] = {i++, 0, begin};
                 continue;
@@ -306,8 +315,7 @@ void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction, st
         }
         i = node.end;
         // A child's crossings are complete, which may complete its parent's, and so on.
-        for (;; --depth) {
-            if (depth == 0) return;
+        for (; depth > 0; --depth) {
             Pending& up = open[depth - 1];
             const PrimitiveNode& parent = tree.nodes[up.node];
             const bool nothing = list.size() == begin;
@@ -324,7 +332,9 @@ void find_crossings(const PrimitiveTree& tree, Vec3d origin, Vec3d direction, st
             }
             begin = up.begin;
         }
+        if (depth == 0) break;
     }
+    std::erase_if(list, [&](const PrimitiveCrossing& c) { return !(c.t >= t0 && c.t <= t1); });
 }
 
 } // namespace porthole

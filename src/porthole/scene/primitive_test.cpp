@@ -201,6 +201,30 @@ TEST(Primitive, TreesAreWhatTheirPartsMake) {
     EXPECT_GT(met, 2000u);
 }
 
+TEST(Primitive, StretchesAreThoseOfTheWholeLine) {
+    Random random(6);
+    std::vector<PrimitiveCrossing> whole, part;
+    std::size_t met = 0;
+    for (int i = 0; i < 400; ++i) {
+        const Made made = random_tree(random, i % 4);
+        for (int k = 0; k < 100; ++k) {
+            const Vec3d origin = random_vector(random, 1), direction = random_direction(random);
+            const double t0 = uniform(random, -3, 2), t1 = t0 + uniform(random, 0, 2);
+            find_crossings(made.tree, origin, direction, whole);
+            find_crossings(made.tree, origin, direction, t0, t1, part);
+            std::erase_if(whole, [&](const PrimitiveCrossing& c) { return c.t < t0 || c.t > t1; });
+            ASSERT_EQ(part.size(), whole.size());
+            for (std::size_t n = 0; n < part.size(); ++n) {
+                EXPECT_EQ(part[n].t, whole[n].t);
+                EXPECT_EQ(part[n].surface, whole[n].surface);
+                EXPECT_EQ(part[n].entering, whole[n].entering);
+            }
+            met += part.size();
+        }
+    }
+    EXPECT_GT(met, 2000u);
+}
+
 TEST(Primitive, BoxesAndHullsHoldTheSurface) {
     Random random(3);
     std::vector<PrimitiveCrossing> list;

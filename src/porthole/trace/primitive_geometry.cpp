@@ -43,8 +43,11 @@ bool find_hit(const PrimitiveGeometry& data, RTCFilterFunctionN filter, RTCInter
               RTCRay& ray, RTCHit& hit) {
     thread_local std::vector<PrimitiveCrossing> crossings; // only its memory outlives the call
     const PrimitiveTree& tree = data.mesh->primitives;
-    find_crossings(tree, Vec3d{ray.org_x, ray.org_y, ray.org_z}, Vec3d{ray.dir_x, ray.dir_y, ray.dir_z}, crossings);
     const float end = ray.tfar;
+    // A little more than the interval, as t is rounded to float.
+    const double slack = 1e-6 * (std::abs(double(ray.tnear)) + (end < kInfinity ? std::abs(double(end)) : 0.0));
+    find_crossings(tree, Vec3d{ray.org_x, ray.org_y, ray.org_z}, Vec3d{ray.dir_x, ray.dir_y, ray.dir_z},
+                   double(ray.tnear) - slack, double(end) + slack, crossings);
     for (const PrimitiveCrossing& crossing : crossings) {
         const auto t = float(crossing.t);
         if (!(t > ray.tnear)) continue;
