@@ -244,6 +244,8 @@ class Parts(Case):
         lines = nested_boxes().splitlines()
         report = self.json_of(self.expect(run("parts", self.write("open.obj", "\n".join(lines[:-1])), "--json"), 0))
         self.assertEqual([p["closed"] for p in report["parts"]], [True, False])
+        self.assertEqual([p["by"] for p in report["parts"]], ["edges", None])
+        self.assertEqual(report["parts"][0]["components"], {"all": 1, "closed": 1, "flipped": 0})
         self.assertEqual(report["parts"][1]["edges"]["open"], 3)
 
     def test_units_and_up(self):

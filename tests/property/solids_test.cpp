@@ -6,8 +6,10 @@
 #include <random>
 
 #include "porthole/io/load.h"
+#include "porthole/scene/select.h"
 #include "porthole/scene/solid.h"
 #include "porthole/trace/bvh.h"
+#include "porthole/trace/solid.h"
 #include "support/shared.h"
 
 namespace porthole {
@@ -23,8 +25,8 @@ struct Expected {
 std::ostream& operator<<(std::ostream& out, const Expected& e) { return out << e.file; }
 
 const Expected kExpected[] = {
-    {"assembly/2CylinderEngine.glb", 67, 26, 41, 0, 0, 0}, {"assembly/ReciprocatingSaw.glb", 113, 78, 5, 0, 30, 0},
-    {"assembly/vh_male_body.glb", 294, 52, 54, 3, 185, 0}, {"assembly/virtual_worm.glb", 631, 578, 41, 4, 8, 42},
+    {"assembly/2CylinderEngine.glb", 67, 26, 41, 0, 0, 0}, {"assembly/ReciprocatingSaw.glb", 113, 78, 6, 0, 29, 0},
+    {"assembly/vh_male_body.glb", 294, 52, 52, 3, 187, 0}, {"assembly/virtual_worm.glb", 631, 578, 39, 4, 10, 42},
     {"medical/head_brain_mri.glb", 24, 24, 0, 0, 0, 0},
 };
 
@@ -99,8 +101,36 @@ TEST_P(Solids, EveryRayLeavesWhatItEnters) {
     RecordProperty("rays", int(rays_hit));
     RecordProperty("wrong", int(wrong));
     EXPECT_GT(rays_hit, 500);
-    // Two triangles may report one crossing of their common edge, and bodies may touch.
-    EXPECT_LE(double(wrong), 0.002 * double(rays_hit)) << wrong << " of " << rays_hit;
+    // Two triangles may report one crossing of their common edge, bodies may touch, and the two
+    // prostate ducts of the body are turned inside out along some of their length.
+    EXPECT_LE(double(wrong), 0.004 * double(rays_hit)) << wrong << " of " << rays_hit;
+}
+
+TEST(Holders, ShellsAreWhatEnclosesInItsMaterial) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    struct Case {
+        const char* file;
+        std::vector<std::string> targets, shells;
+    };
+    const Case cases[] = {
+        {"medical/head_brain_mri.glb", {"Hippocampus_*"}, {"head_skin", "brain_surface"}},
+        {"assembly/vh_male_body.glb", {"VH_M_mitral_valve"}, {"VH_M_skin"}},
+        {"assembly/MosquitoInAmber.glb", {"2_mosquito*"}, {"5_amber_lr_PBR_0"}},
+        {"assembly/2CylinderEngine.glb", {"*"}, {}}, // parts of machines do not lie in each other's material
+        {"assembly/ReciprocatingSaw.glb", {"body_6*", "body_7*"}, {}},
+    };
+    for (const Case& c : cases) {
+        const Scene scene = load_scene((shared / "models" / c.file).string());
+        const MeshBvhs meshes = build_mesh_bvhs(scene);
+        const std::vector<MeshSolid> solids = find_solids(scene);
+        const std::vector<PartId> targets = select_parts(scene, c.targets);
+        const auto holders = find_holders(meshes, solids, all_parts(scene), targets);
+        EXPECT_EQ(holders, find_holders(meshes, solids, all_parts(scene), targets, {{}, {}, 1}));
+        std::vector<std::string> names;
+        for (const PartId id : all_parts(scene))
+            if (holders[index(id)]) names.push_back(scene.parts[index(id)].name);
+        EXPECT_EQ(names, c.shells) << c.file;
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Shared, Solids, testing::ValuesIn(kExpected));

@@ -62,8 +62,8 @@ struct MeshSolid {
 /// to speak of), copies of triangles and needles bound nothing and open nothing.
 ///
 /// The pieces that edges leave open are judged by 300 seeded lines through points of their
-/// surface, in six directions: closed if on at least 94 % of them the crossings balance and never
-/// go negative.
+/// surface, in six directions (1500 lines in thirty where the first ones leave a doubt): closed if
+/// on at least 94 % of them the crossings balance and never go negative.
 /// - All together, as many CAD exports tessellate each face by itself. They face as wound, or all
 ///   the other way if that is what balances. Where more than a fifth of the lines is inside
 ///   twice, bodies that overlap cannot be told from a cavity wound the wrong way: open.
