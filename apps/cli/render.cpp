@@ -31,7 +31,7 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     WireParams wire = options.wire;
     wire.background = look.background;
     const Frame frame = options.mode == RenderOptions::Mode::wireframe
-                            ? render_wireframe(whole, view, wire, control)
+                            ? render_wireframe(meshes, all_parts(scene), view, wire, control)
                             : render(whole, nullptr, view, look, nullptr, nullptr, control);
     report.run.render = drawing.seconds();
 

@@ -77,12 +77,13 @@ public:
         : view_(view), trace_(trace), rules_(rules), tile_(tile), reach_(reach_of(rules)),
           coarse_(tile.grown(reach_ + 2)), fine_{2 * coarse_.x0, 2 * coarse_.y0, 2 * coarse_.x1 + 1,
                                                  2 * coarse_.y1 + 1},
-          samples_(fine_), known_(fine_), close_(tile.grown(reach_)), across_(fine_), down_(fine_) {}
+          slot_(fine_, kNotTraced), close_(tile.grown(reach_)) {}
 
     void run(const std::function<bool(int, int)>& inside, LineInk& ink) {
         look_at_pixels(inside);
         if (!find_suspects()) return;
         look_closely(inside);
+        across_ = down_ = Image<LinePoint>(fine_);
         find_crossings();
         thin_out();
         join(ink);
@@ -94,9 +95,8 @@ private:
     public:
         explicit Batch(Lattice& lattice) : lattice_(lattice) {}
         void add(int i, int j) {
-            if (lattice_.known_(i, j)) return;
-            lattice_.known_(i, j) = 1;
-            points_[n_] = {i, j};
+            if (lattice_.known(i, j)) return;
+            lattice_.slot_(i, j) = std::int32_t(lattice_.samples_.size()) + n_;
             samples_.x[n_] = 0.5f * float(i), samples_.y[n_] = 0.5f * float(j);
             samples_.active[n_] = true;
             if (++n_ == kLanes) flush();
@@ -106,16 +106,18 @@ private:
             for (int k = n_; k < kLanes; ++k) samples_.active[k] = false;
             std::array<LineSample, kLanes> seen;
             lattice_.trace_(samples_, seen.data());
-            for (int k = 0; k < n_; ++k) lattice_.samples_(points_[k].x, points_[k].y) = seen[std::size_t(k)];
+            lattice_.samples_.insert(lattice_.samples_.end(), seen.begin(), seen.begin() + n_);
             n_ = 0;
         }
 
     private:
         Lattice& lattice_;
         Samples16 samples_;
-        Vec2i points_[kLanes];
         int n_ = 0;
     };
+
+    [[nodiscard]] bool known(int i, int j) const { return slot_(i, j) != kNotTraced; }
+    [[nodiscard]] const LineSample& sample(int i, int j) const { return samples_[std::size_t(slot_(i, j))]; }
 
     void look_at_pixels(const std::function<bool(int, int)>& inside) {
         Batch batch(*this);
@@ -133,8 +135,8 @@ private:
         const Rect r = coarse_;
         const auto compare = [&](int x, int y, int dx, int dy) {
             const int i = 2 * x + 1, j = 2 * y + 1, k = i + 2 * dx, l = j + 2 * dy;
-            if (x + dx >= r.x1 || y + dy >= r.y1 || !known_(i, j) || !known_(k, l)) return;
-            if (!suspect(view_, samples_(i, j), samples_(k, l))) return;
+            if (x + dx >= r.x1 || y + dy >= r.y1 || !known(i, j) || !known(k, l)) return;
+            if (!suspect(view_, sample(i, j), sample(k, l))) return;
             any = true;
             for (int v = y - 1; v <= y + dy + 1; ++v)
                 for (int u = x - 1; u <= x + dx + 1; ++u)
@@ -172,8 +174,8 @@ private:
         std::vector<Link> links;
         const auto add = [&](int i, int j, bool is_across) {
             const int k = is_across ? i + 1 : i, l = is_across ? j : j + 1;
-            if (!known_(i, j) || !known_(k, l)) return;
-            const LineSample &a = samples_(i, j), &b = samples_(k, l);
+            if (!known(i, j) || !known(k, l)) return;
+            const LineSample &a = sample(i, j), &b = sample(k, l);
             if (!suspect(view_, a, b)) return;
             // The rim has its own line, which is smoother than where rays happen to meet it.
             if (a.in_hole != b.in_hole && (a.part == b.part || !(a.on_target || b.on_target))) return;
@@ -316,29 +318,35 @@ private:
     Rect tile_;
     int reach_;
     Rect coarse_, fine_;
-    Image<LineSample> samples_;
-    Mask known_;
+    static constexpr std::int32_t kNotTraced = -1;
+    Image<std::int32_t> slot_; ///< of a lattice point in samples_
+    std::vector<LineSample> samples_;
     Mask close_;
     Image<LinePoint> across_, down_; ///< on the link to the right and below
 };
 
 } // namespace
 
-LineTrace plain_trace(const Bvh& bvh, const View& view, const std::vector<Placement>& placements, RayCounts& rays) {
-    return [&](const Samples16& samples, LineSample* out) {
+LineTrace plain_trace(const Bvh& bvh, const View& view, const std::vector<Placement>& placements, RayCounts& rays,
+                      int layer) {
+    return [&, layer](const Samples16& samples, LineSample* out) {
         RayHit16 packet;
-        float depth_per_t[kLanes];
-        for (int i = 0; i < kLanes; ++i) {
-            if (!samples.active[i]) {
+        float depth_per_t[kLanes], tnear[kLanes] = {};
+        for (int passed = 0;; ++passed) {
+            for (int i = 0; i < kLanes; ++i) {
                 packet.clear(i);
-                continue;
+                if (!samples.active[i] || !(tnear[i] < kInfinity)) continue;
+                const Ray ray = view.ray(samples.x[i], samples.y[i]);
+                packet.set(i, ray.origin, ray.direction, tnear[i], kInfinity);
+                depth_per_t[i] = ray.depth_per_t;
+                ++rays.primary;
             }
-            const Ray ray = view.ray(samples.x[i], samples.y[i]);
-            packet.set(i, ray.origin, ray.direction, 0, kInfinity);
-            depth_per_t[i] = ray.depth_per_t;
-            ++rays.primary;
+            intersect(bvh, packet, Coherence::coherent);
+            if (passed == layer) break;
+            for (int i = 0; i < kLanes; ++i)
+                tnear[i] =
+                    packet.hit(i) ? packet.tfar[i] * (1 + 4e-6f) + placements[index(packet.part(i))].offset : kInfinity;
         }
-        intersect(bvh, packet, Coherence::coherent);
         for (int i = 0; i < kLanes; ++i) {
             if (!samples.active[i]) continue;
             LineSample& s = out[i];

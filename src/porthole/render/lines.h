@@ -24,9 +24,10 @@ struct LineSample {
 /// Looks at up to sixteen positions; fills the active lanes.
 using LineTrace = std::function<void(const Samples16& samples, LineSample* seen)>;
 
-/// Rays through everything in `bvh`; counts them in `rays`. Keeps references.
+/// Rays through everything in `bvh`, which see the surface after `layer` others; counts them in
+/// `rays`. Keeps references.
 [[nodiscard]] LineTrace plain_trace(const Bvh& bvh, const View& view, const std::vector<Placement>& placements,
-                                    RayCounts& rays);
+                                    RayCounts& rays, int layer = 0);
 
 /// How dark lines are, by what they separate: share of the light taken, [0, 1]; 0: not drawn.
 struct LineRules {

@@ -21,6 +21,7 @@ constexpr float kHides = 1.0f / 3.0f;            ///< pixel sizes in front of an
 constexpr float kVisible = 0.9f, kHidden = 0.5f; ///< darkness
 constexpr float kFeatureWidth = 1.25f;           ///< of width_px
 constexpr float kDash = 6;                       ///< pixels
+constexpr int kLayers = 4;                       ///< surfaces of a primitive behind each other whose lines are dashed
 constexpr int kTile = 64;
 constexpr std::size_t kChunk = 4096; ///< edges that one thread takes at once
 
@@ -239,9 +240,10 @@ struct Edges {
 
 class Wireframe {
 public:
-    Wireframe(const Bvh& bvh, const View& view, const WireParams& params, const Control& control)
-        : bvh_(bvh), scene_(bvh.scene()), view_(view), params_(params), control_(control),
-          half_width_(0.5f * kFeatureWidth * params.width_px * line_scale(view)),
+    Wireframe(const MeshBvhs& meshes, std::span<const PartId> parts, const View& view, const WireParams& params,
+              const Control& control)
+        : meshes_(meshes), bvh_(build_bvh(meshes, parts)), scene_(meshes.scene()), view_(view), params_(params),
+          control_(control), half_width_(0.5f * kFeatureWidth * params.width_px * line_scale(view)),
           margin_(int(std::ceil(half_width_)) + 2), nearest_(float(1e-6 * scene_bounds(scene_).diagonal())) {}
 
     Frame draw() {
@@ -330,9 +332,30 @@ private:
         return n > 0 && sum / double(n) >= double(kLongEdge);
     }
 
+    struct Primitive {
+        PartId part;
+        Bvh alone;
+        Rect box; ///< pixels that its projected box touches
+    };
+
     void find_primitives() {
-        for (const PartId id : all_parts(scene_))
-            if (bvh_.holds(id) && !scene_.mesh_of(id).primitives.empty()) primitives_.push_back(id);
+        for (const PartId id : all_parts(scene_)) {
+            if (!bvh_.holds(id) || scene_.mesh_of(id).primitives.empty()) continue;
+            Primitive primitive{id, build_bvh(meshes_, std::span(&id, 1)), view_.window()};
+            const Bounds3d bounds = part_bounds(scene_, id);
+            float x0 = kInfinity, y0 = kInfinity, x1 = -kInfinity, y1 = -kInfinity;
+            bool behind = false;
+            for (int i = 0; i < 8; ++i) {
+                const PixelPoint p = view_.project(Vec3f(bounds.corner(i)));
+                behind |= !(p.depth > nearest_);
+                x0 = std::min(x0, p.x), y0 = std::min(y0, p.y), x1 = std::max(x1, p.x), y1 = std::max(y1, p.y);
+            }
+            const auto rounded = [](float v) { return int(std::floor(std::clamp(v, -1e6f, 1e6f))); };
+            if (!behind)
+                primitive.box = Rect{rounded(x0), rounded(y0), rounded(x1) + 1, rounded(y1) + 1}.grown(2).intersected(
+                    view_.window());
+            primitives_.push_back(std::move(primitive));
+        }
     }
 
     void bin() {
@@ -360,6 +383,8 @@ private:
                 ink.open.add(strokes_[i].stroke);
         }
         if (!primitives_.empty()) draw_primitives(tile, ink);
+        if (params_.hidden == HiddenLines::dashed)
+            for (const Primitive& primitive : primitives_) draw_hidden(primitive, tile, ink);
         const Vec3f b = params_.background;
         const float light = 0.2126f * b.x + 0.7152f * b.y + 0.0722f * b.z < 0.18f ? 0.9f : 0.02f;
         for (int y = tile.y0; y < tile.y1; ++y)
@@ -386,7 +411,41 @@ private:
         rays_ += rays.primary;
     }
 
-    const Bvh& bvh_;
+    /// The dashed lines of one primitive: what rays meet of it alone, surface after surface, except
+    /// what is seen.
+    void draw_hidden(const Primitive& primitive, Rect tile, LineInk& ink) {
+        if (primitive.box.grown(2).intersected(tile).empty()) return;
+        const Rect near = primitive.box.grown(4);
+        const auto inside = [&](int x, int y) { return near.contains(x, y); };
+        RayCounts rays;
+        LineRules rules;
+        rules.half_width = 0.75f * half_width_;
+        rules.outline = rules.part = rules.step = rules.crease = kHidden;
+        rules.dash_px = kDash * line_scale(view_);
+        for (int layer = 0; layer < kLayers; ++layer) {
+            const LineTrace trace = [&](const Samples16& samples, LineSample* out) {
+                look_through(primitive, layer, samples, out, rays);
+            };
+            find_lines(view_, tile, inside, trace, rules, ink);
+        }
+        rays_ += rays.primary;
+    }
+
+    /// The surface of a primitive that a ray meets after `layer` others of it.
+    void look_through(const Primitive& primitive, int layer, const Samples16& samples, LineSample* out,
+                      RayCounts& rays) const {
+        const LineTrace alone = plain_trace(primitive.alone, view_, placements_, rays, layer);
+        alone(samples, out);
+        if (layer > 0) return;
+        std::array<LineSample, kLanes> seen;
+        plain_trace(bvh_, view_, placements_, rays)(samples, seen.data());
+        for (std::size_t i = 0; i < kLanes; ++i)
+            if (samples.active[i] && out[i].part != kNoPart)
+                out[i].masked = out[i].depth <= seen[i].depth + kHides * view_.pixel_size(seen[i].depth);
+    }
+
+    const MeshBvhs& meshes_;
+    const Bvh bvh_;
     const Scene& scene_;
     const View& view_;
     const WireParams& params_;
@@ -395,7 +454,7 @@ private:
     int margin_;
     float nearest_;
     std::vector<WireStroke> strokes_;
-    std::vector<PartId> primitives_;
+    std::vector<Primitive> primitives_;
     std::vector<Placement> placements_;
     int columns_ = 0, rows_ = 0;
     std::vector<std::vector<std::uint32_t>> bins_; ///< strokes by tile
@@ -404,11 +463,12 @@ private:
 
 } // namespace
 
-Frame render_wireframe(const Bvh& bvh, const View& view, const WireParams& params, const Control& control) {
+Frame render_wireframe(const MeshBvhs& meshes, std::span<const PartId> parts, const View& view,
+                       const WireParams& params, const Control& control) {
     if (!(params.width_px > 0) || !(params.width_px <= 100))
         throw Error(ErrorKind::usage, "E0140", "width_px", "outside 0..100");
     try {
-        return Wireframe(bvh, view, params, control).draw();
+        return Wireframe(meshes, parts, view, params, control).draw();
     } catch (const std::bad_alloc&) {
         throw Error(ErrorKind::limit, "E0902", "render",
                     "memory ran out for a wireframe of " + std::to_string(view.width) + " x " +

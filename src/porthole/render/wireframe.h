@@ -19,19 +19,19 @@ struct WireParams {
     Vec3f background{1, 1, 1}; ///< linear; lines are dark on it, or light where it is darker than mid grey
 };
 
-/// Draws the edges of everything in `bvh` without surfaces: alpha 0 between the lines.
+/// Draws the edges of `parts` without surfaces: alpha 0 between the lines.
 ///
 /// Edges are found on each mesh after welding its vertices, projected, and asked along their
 /// length, every pixel, whether something lies in front: surfaces are opaque, whatever their
 /// material. That needs no orientation, closedness or connection of the triangles. What is nearer
 /// than a third of a pixel's size does not hide. An edge is a crease from 60 degrees on, from 15 where
 /// vertex normals are split at it, from 30 without vertex normals. Primitives have no edges: their outlines and
-/// creases are found by rays.
+/// creases are found by rays, of up to four surfaces behind each other if they are dashed.
 /// @return colour and ids as render() does.
 /// @throws Error usage E0140; limit E0902; Cancelled.
 /// The same bits for any number of threads. Reports progress as stage "render".
 /// Cost: a sort of the edges and a ray for each pixel of their length.
-[[nodiscard]] Frame render_wireframe(const Bvh& bvh, const View& view, const WireParams& params = {},
-                                     const Control& control = {});
+[[nodiscard]] Frame render_wireframe(const MeshBvhs& meshes, std::span<const PartId> parts, const View& view,
+                                     const WireParams& params = {}, const Control& control = {});
 
 } // namespace porthole
