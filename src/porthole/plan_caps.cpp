@@ -9,6 +9,7 @@ void plan_caps(const Subject& subject, ViewPlan& plan, const CapOverrides& overr
     const std::vector<std::uint8_t> holders = find_holders(meshes, plan.solids, plan.cut_set, plan.opened, control);
     plan.caps = classify(meshes, plan.solids, plan.cut_set, holders, plan.view, overrides);
     plan.cut.cap = plan.caps.rule;
+    index_ranges(plan.cut);
 }
 
 } // namespace porthole

@@ -95,8 +95,42 @@ bool Cut::removes(Vec3f world, PartId part) const {
     const PixelPoint p = view.project(world);
     if (!(p.depth > 0) && !view.orthographic) return false;
     if (!(std::abs(p.x) < 1e8f) || !(std::abs(p.y) < 1e8f)) return false;
+    if (which == CutRole::cut_set && !ranges.empty()) {
+        const CutRange range = ranges[level_of(part)].at_or(int(std::floor(p.x)), int(std::floor(p.y)), CutRange{});
+        if (p.depth < range.near) return true;
+        if (!(p.depth < range.far)) return false;
+    }
     if (distance_at(p.x, p.y) > 0) return false;
     return p.depth < (which == CutRole::loose ? loose_depth_at(p.x, p.y) : depth_at(p.x, p.y, level_of(part)).depth);
+}
+
+void index_ranges(Cut& cut) {
+    cut.ranges.clear();
+    const Rect w = cut.distance.window();
+    for (const CutLevel& profiles : cut.levels) {
+        Image<CutRange>& ranges = cut.ranges.emplace_back(w);
+        for (int y = w.y0 + 1; y < w.y1 - 1; ++y)
+            for (int x = w.x0 + 1; x < w.x1 - 1; ++x) {
+                // Anywhere in the pixel the depth is a mean of floors around it, or one of them, if
+                // all of them lie beyond the chamfer; outside the hole nothing is gone.
+                CutRange range{kInfinity, -kInfinity};
+                float shallowest = kInfinity, chamfer_end = -kInfinity, deepest = -kInfinity;
+                for (int dy = -1; dy <= 1; ++dy)
+                    for (int dx = -1; dx <= 1; ++dx) {
+                        const CutProfile& p = profiles(x + dx, y + dy);
+                        const float inside = -cut.distance(x + dx, y + dy);
+                        shallowest = std::min(shallowest, inside), deepest = std::max(deepest, inside);
+                        chamfer_end = std::max(chamfer_end, p.start + p.width);
+                        range.near = std::min(range.near, p.floor), range.far = std::max(range.far, p.floor);
+                    }
+                // Interpolated values stay between those of the pixels, but for their rounding.
+                const auto rounding = [](float v) { return std::isfinite(v) ? 1e-6f * std::abs(v) : 0.0f; };
+                if (deepest < 0)
+                    ranges(x, y).far = -kInfinity;
+                else if (shallowest >= chamfer_end + 1e-3f)
+                    ranges(x, y) = {range.near - rounding(range.near), range.far + rounding(range.far)};
+            }
+    }
 }
 
 } // namespace porthole

@@ -53,17 +53,25 @@ struct CutDepth {
     bool chamfer = false;     ///< on the chamfer, where shells are capped
 };
 
+/// Between which depths the cut of a level runs in a pixel: what is nearer than `near` is gone
+/// wherever in the pixel it lies, what is not nearer than `far` is not.
+struct CutRange {
+    float near = -kInfinity, far = kInfinity;
+    friend bool operator==(const CutRange&, const CutRange&) = default;
+};
+
 /// The hole as it acts on rays.
 ///
 /// All images share one window, which covers every pixel of the hole and one more around.
 struct Cut {
     View view;
-    Image<float> distance;        ///< signed distance to the hole's rim, pixels; <= 0 inside
-    std::vector<CutLevel> levels; ///< outermost first; at least one unless empty()
-    Image<float> loose_depth;     ///< loose parts nearer than this are gone; -infinity where no cut part was removed
-    std::vector<CutRole> role;    ///< by part id
+    Image<float> distance;           ///< signed distance to the hole's rim, pixels; <= 0 inside
+    std::vector<CutLevel> levels;    ///< outermost first; at least one unless empty()
+    Image<float> loose_depth;        ///< loose parts nearer than this are gone; -infinity where no cut part was removed
+    std::vector<CutRole> role;       ///< by part id
     std::vector<std::uint8_t> level; ///< by part id: of parts of the cut set; empty: all 0
     std::vector<CapRule> cap;        ///< by part id; empty: no caps
+    std::vector<Image<CutRange>> ranges; ///< by level, from index_ranges(); empty: removes() is slower
 
     [[nodiscard]] bool empty() const { return distance.empty(); }
     [[nodiscard]] std::size_t level_of(PartId part) const { return level.empty() ? 0 : level[porthole::index(part)]; }
@@ -81,5 +89,9 @@ struct Cut {
     /// the hole, and is nearer than the cut (loose) depth there. Exact at pixel centres.
     [[nodiscard]] bool removes(Vec3f world, PartId part) const;
 };
+
+/// Fills `cut.ranges`, which let removes() answer at a glance for most points. To be called again
+/// when the cut has changed. Cost: linear in the window.
+void index_ranges(Cut& cut);
 
 } // namespace porthole

@@ -139,13 +139,25 @@ void Camera::trace_levels(const Samples16& samples, const float (&depth_per_t)[k
         }
     }
     CapLanes capped;
-    if (caps_ && samples.at_centres) {
-        for (int i = 0; i < kLanes; ++i)
-            for (std::size_t k = 0; k < levels; ++k)
-                if (lanes.t[k][i] < kInfinity)
-                    capped.cap[k][i] = caps_->at(k, int(std::floor(samples.x[i])), int(std::floor(samples.y[i])));
-    } else if (caps_) {
-        capped = find_caps(*bvh_, *cut_, caps_->solids, packet, lanes);
+    if (caps_) {
+        // Between pixels whose caps differ every sample has to find its own.
+        bool asks[kLanes], any = false;
+        for (int i = 0; i < kLanes; ++i) {
+            const int x = int(std::floor(samples.x[i])), y = int(std::floor(samples.y[i]));
+            asks[i] = false;
+            for (std::size_t k = 0; k < levels; ++k) {
+                if (!(lanes.t[k][i] < kInfinity)) continue;
+                asks[i] |= !samples.at_centres && !caps_->is_even(k, x, y);
+                capped.cap[k][i] = caps_->at(k, x, y);
+            }
+            any |= asks[i];
+            if (!asks[i]) packet.clear(i);
+        }
+        if (any) {
+            const CapLanes found = find_caps(*bvh_, *cut_, caps_->solids, packet, lanes);
+            for (int i = 0; i < kLanes; ++i)
+                for (std::size_t k = 0; k < levels && asks[i]; ++k) capped.cap[k][i] = found.cap[k][i];
+        }
     }
     for (std::size_t k = 0; k < levels; ++k) {
         for (int i = 0; i < kLanes; ++i) {
@@ -174,8 +186,9 @@ void Camera::trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const 
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {
         if (tnear[i] < kInfinity) {
-            packet.set(i, seen.origin[i], seen.direction[i], tnear[i], kInfinity, mask);
-            any = true;
+            // Beyond what is seen already nothing matters.
+            packet.set(i, seen.origin[i], seen.direction[i], tnear[i], seen.depth[i] / depth_per_t[i], mask);
+            any |= packet.active(i);
         } else {
             packet.clear(i);
         }

@@ -35,7 +35,6 @@ CappedLevels capped_levels(const Cut& cut) {
 
 /// A ray that goes into or comes out of the material of a part that may be capped.
 struct Passage {
-    int lane = 0;
     float t = 0;
     int sign = 0; ///< -1 in, +1 out
     SurfaceRef surface;
@@ -49,27 +48,29 @@ bool is_repeated(const Passage& a, const Passage& b) {
            on_edge(a.surface) && on_edge(b.surface);
 }
 
-/// Passages of the active lanes up to their tfar, by lane and t.
+/// By lane, in order of t.
+using Passages = std::array<std::vector<Passage>, kLanes>;
+
+/// Passages of the active lanes up to their tfar.
 void find_passages(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids, RayHit16& rays,
-                   std::vector<Passage>& passages) {
-    passages.clear();
+                   Passages& passages) {
+    for (std::vector<Passage>& lane : passages) lane.clear();
     const Scene& scene = bvh.scene();
     for_each_crossing(bvh, rays, [&](const Crossing& c) {
         if (cut.cap_of(c.part) == CapRule::none) return;
         const int sign = crossing_sign(solids[scene.parts[index(c.part)].mesh], c.triangle, c.entering);
-        if (sign != 0) passages.push_back({c.lane, c.t, sign, {c.part, c.triangle, c.u, c.v}});
+        if (sign != 0) passages[std::size_t(c.lane)].push_back({c.t, sign, {c.part, c.triangle, c.u, c.v}});
     });
-    std::sort(passages.begin(), passages.end(), [](const Passage& a, const Passage& b) {
-        if (a.lane != b.lane) return a.lane < b.lane;
-        if (a.t != b.t) return a.t < b.t;
-        if (a.surface.part != b.surface.part) return index(a.surface.part) < index(b.surface.part);
-        if (a.sign != b.sign) return a.sign < b.sign;
-        return a.surface.triangle < b.surface.triangle;
-    });
-    passages.erase(
-        std::unique(passages.begin(), passages.end(),
-                    [](const Passage& a, const Passage& b) { return a.lane == b.lane && is_repeated(a, b); }),
-        passages.end());
+    for (std::vector<Passage>& lane : passages) {
+        if (lane.size() < 2) continue;
+        std::sort(lane.begin(), lane.end(), [](const Passage& a, const Passage& b) {
+            if (a.t != b.t) return a.t < b.t;
+            if (a.surface.part != b.surface.part) return index(a.surface.part) < index(b.surface.part);
+            if (a.sign != b.sign) return a.sign < b.sign;
+            return a.surface.triangle < b.surface.triangle;
+        });
+        lane.erase(std::unique(lane.begin(), lane.end(), is_repeated), lane.end());
+    }
 }
 
 /// Parts that a ray is inside of, entered last at the back.
@@ -120,11 +121,6 @@ SurfaceRef cap_at(const Cut& cut, std::span<const Passage> lane, std::size_t lev
     return cap ? *cap : SurfaceRef{};
 }
 
-std::span<const Passage> lane_of(const std::vector<Passage>& passages, int lane) {
-    const auto range = std::ranges::equal_range(passages, lane, {}, &Passage::lane);
-    return {range.begin(), range.end()};
-}
-
 /// Farthest cut of a lane that can be capped; -infinity: none.
 float deepest(const CappedLevels& capped, const CutLanes& lanes, std::size_t levels, int lane) {
     float t = -kInfinity;
@@ -156,12 +152,11 @@ CapLanes find_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> so
         any |= rays.active(i);
     }
     if (!any) return caps;
-    std::vector<Passage> passages;
+    Passages passages;
     find_passages(bvh, cut, solids, rays, passages);
     Inside inside;
-    for (int i = 0; i < kLanes && !passages.empty(); ++i) {
-        if (!rays.active(i)) continue;
-        const std::span<const Passage> lane = lane_of(passages, i);
+    for (int i = 0; i < kLanes; ++i) {
+        const std::vector<Passage>& lane = passages[std::size_t(i)];
         for (std::size_t k = 0; k < cut.levels.size() && !lane.empty(); ++k)
             if (lanes.t[k][i] < kInfinity && capped.at(k, lanes.chamfer[k][i]))
                 caps.cap[k][i] = cap_at(cut, lane, k, lanes.t[k][i], lanes.chamfer[k][i], inside);
@@ -276,7 +271,7 @@ public:
         if (n == 0) return 0;
         find_passages(bvh_, cut_, caps_.solids, rays, passages_);
         for (int i = 0; i < kLanes; ++i) {
-            const std::span<const Passage> lane = lane_of(passages_, i);
+            const std::vector<Passage>& lane = passages_[std::size_t(i)];
             if (lane.empty()) continue;
             for (std::size_t k = 0; k < cut_.levels.size(); ++k)
                 if (capped_.any[k]) store(lane, k, x0 + (i & 3), y0 + (i >> 2), depth_per_t[i]);
@@ -384,7 +379,7 @@ private:
     const CappedLevels& capped_;
     Caps& caps_;
     TileMesh mesh_;
-    std::vector<Passage> passages_;
+    Passages passages_;
     Inside inside_;
 };
 
@@ -396,6 +391,19 @@ Rect hole_box(const Cut& cut) {
             if (cut.distance(x, y) <= 0)
                 box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
     return box.empty() ? Rect{} : box;
+}
+
+Mask even_pixels(const Image<SurfaceRef>& caps) {
+    Mask even(caps.window(), 0);
+    const Rect w = caps.window();
+    for (int y = w.y0 + 1; y < w.y1 - 1; ++y)
+        for (int x = w.x0 + 1; x < w.x1 - 1; ++x) {
+            bool same = true;
+            for (int dy = -1; dy <= 1; ++dy)
+                for (int dx = -1; dx <= 1; ++dx) same &= caps(x + dx, y + dy).part == caps(x, y).part;
+            even(x, y) = same;
+        }
+    return even;
 }
 
 void append(CapMesh& all, const CapMesh& piece) {
@@ -439,6 +447,7 @@ Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solid
         traced += n;
     });
     for (const CapMesh& piece : pieces) append(caps.mesh, piece);
+    for (const Image<SurfaceRef>& level : caps.levels) caps.even.push_back(even_pixels(level));
     if (rays) *rays += traced;
     return caps;
 }

@@ -39,11 +39,16 @@ struct CapLanes {
 struct Caps {
     std::span<const MeshSolid> solids;     ///< by mesh index; must stay alive
     std::vector<Image<SurfaceRef>> levels; ///< by level, over the hole's box: part kNoPart where there is none
+    std::vector<Mask> even; ///< by level: 1 where a pixel and its eight neighbours have caps of one part, or none
     CapMesh mesh; ///< one quad a capped pixel, larger ones where the cut is flat, and the walls between pixels
                   ///< where it drops through a solid. See-through materials have none: light passes them
     [[nodiscard]] bool empty() const { return levels.empty(); }
     [[nodiscard]] SurfaceRef at(std::size_t level, int x, int y) const {
         return levels.empty() ? SurfaceRef{} : levels[level].at_or(x, y, SurfaceRef{});
+    }
+    /// Whether the pixel's cap stands for all of its samples.
+    [[nodiscard]] bool is_even(std::size_t level, int x, int y) const {
+        return levels[level].empty() || even[level].at_or(x, y, 0) != 0;
     }
 };
 
