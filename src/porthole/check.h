@@ -53,8 +53,8 @@ struct Checked {
 /// pixel counts, visible_before, visible_after, visible_among_targets, outline_iou,
 /// see_through_px and hole_pixels. The cut itself and the hole's mask come from a plan with
 /// ContourMethod::full. Then the plain picture and the reveal are drawn again: pixels that are
-/// neither in the hole nor touch it must equal the plain picture, all others the reveal; and
-/// every other figure of the report must come out again, except run, version and warnings.
+/// neither in the hole nor touch it, nor hold a hair of a target, must equal the plain picture, all others the reveal;
+/// and every other figure of the report must come out again, except run, version and warnings.
 ///
 /// @param meshes    of the scene that `reported` names.
 /// @param reported  from read_report.

@@ -157,15 +157,14 @@ private:
             if (opened_[index(target.part)]) add(target.part, target.depth);
         for (const auto& [part, centres] : centres_)
             if (opened_[index(part)]) add(part, centres);
-        const Rect picture = view_.window();
-        for (int y = picture.y0; y < picture.y1; ++y)
-            for (int x = picture.x0; x < picture.x1; ++x) {
-                const PartId id = dense_.nearest.id(x, y);
-                if (id == kNoPart) continue;
-                DenseTarget& target = dense_.targets[std::size_t(target_index_[index(id)])];
-                ++target.among;
-                target.among_tied |= dense_.tied(x, y) != 0;
-            }
+        for (DenseTarget& target : dense_.targets) {
+            const Rect box = target.depth.window().intersected(view_.window());
+            for (int y = box.y0; y < box.y1; ++y)
+                for (int x = box.x0; x < box.x1; ++x) {
+                    target.among += dense_.nearest.id(x, y) == target.part;
+                    target.among_tied |= dense_.tied(x, y) && target.depth(x, y) == dense_.nearest.depth(x, y);
+                }
+        }
     }
 
     /// Whether the surface is gone at the centre of a pixel, by the definition of the cut.
@@ -182,7 +181,9 @@ private:
     /// What is left of `surfaces` at the centre of a pixel.
     [[nodiscard]] Surfaces left(int x, int y, const Surfaces& surfaces) const {
         if (plan_.cut.empty()) return surfaces;
-        const float target = dense_.nearest.depth.at_or(x, y, kInfinity);
+        const auto first = std::find_if(surfaces.begin(), surfaces.end(),
+                                        [&](const Surface& s) { return opened_[index(s.part)] != 0; });
+        const float target = first == surfaces.end() ? kInfinity : first->depth;
         // What touches a target counts as behind it.
         const float rounding = 8 * std::numeric_limits<float>::epsilon() * target;
         const float limit = target - std::max(subject_.tolerance(), rounding);

@@ -65,10 +65,14 @@ TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const 
     else if (target.refused)
         r.refused = "no room";
 
+    // A refused target is not one of the group; when all are, the plan's ids still show them.
+    const auto is_nearest = [&](int x, int y) {
+        return !target.refused && plan.target_ids.id.at_or(x, y, kNoPart) == target.part;
+    };
     Mask nearest_of_all(target.alone.window().intersected(plan.target_ids.window()), 0);
     const Rect around = nearest_of_all.window();
     for (int y = around.y0; y < around.y1; ++y)
-        for (int x = around.x0; x < around.x1; ++x) nearest_of_all(x, y) = plan.target_ids.id(x, y) == target.part;
+        for (int x = around.x0; x < around.x1; ++x) nearest_of_all(x, y) = is_nearest(x, y);
     r.mask = encode_runs(nearest_of_all);
 
     const Rect box = target.alone.window().intersected(before.ids.window());
@@ -78,7 +82,7 @@ TargetReport measure_target(const Subject& subject, const ViewPlan& plan, const 
             const bool alone = target.alone(x, y) != 0;
             seen_before += alone && before.ids.id(x, y) == target.part;
             seen_after += alone && after.ids.id(x, y) == target.part;
-            const bool nearest = plan.target_ids.id.at_or(x, y, kNoPart) == target.part;
+            const bool nearest = is_nearest(x, y);
             among += nearest;
             among_seen += nearest && after.ids.id(x, y) == target.part;
         }

@@ -66,6 +66,7 @@ void set_options(Report& report, const Scene& scene, const RevealParams& options
 
 PixelRuns encode_runs(const Mask& mask) {
     PixelRuns result;
+    if (mask.empty()) return result;
     Rect& box = result.window;
     const Rect w = mask.window();
     box = {w.x1, w.y1, w.x0, w.y0};
