@@ -148,6 +148,7 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
         covered.pixels()[i] =
             plan.spans.nearest.pixels()[i] < kInfinity || before_border.nearest.pixels()[i] < kInfinity;
     plan.hole = grow_hole(contours, plan.core, covered, plan.enclosing, {.depth_px = band.depth_px, .blur_px = 0});
+    plan.hole.distance = rim_distance(plan.hole);
     const Hole& hole = plan.hole;
     plan.hole.floor_depth =
         blur_floor(std::move(plan.hole.floor_depth), hole.mask, plan.target_ids.id, hole.bounds, floor_blur, 2);
@@ -171,7 +172,7 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
     rim.least_px = std::max(kLeastChamferPx, kLeastChamfer * float(view.height));
     if (params.bevel) rim.bevel_px = float(length_px(subject, view, *params.bevel));
     if (params.angle_deg) rim.angle = float(*params.angle_deg * double(kPi) / 180);
-    plan.cut.levels = rim_levels(hole, view, walls, rim);
+    plan.cut.levels = rim_levels(hole, plan.core.id, view, walls, rim);
     keep_last_surface(subject, cut_bvh, plan, control);
 }
 
