@@ -227,16 +227,25 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
 }
 
 void Shader::finish() {
-    // The newest first: the queue stays short, and rays that were born together stay together.
-    while (!queue_.empty()) trace_newest();
+    // The oldest first: what one sample gathers is added in the order of its own bounces, whichever
+    // samples are in the batch beside it, so that its sum has the same bits.
+    constexpr std::size_t kSpent = 4096;
+    while (oldest_ < queue_.size()) {
+        trace_oldest();
+        if (oldest_ < kSpent || 2 * oldest_ < queue_.size()) continue;
+        queue_.erase(queue_.begin(), queue_.begin() + std::ptrdiff_t(oldest_));
+        oldest_ = 0;
+    }
+    queue_.clear();
+    oldest_ = 0;
 }
 
-void Shader::trace_newest() {
+void Shader::trace_oldest() {
     const Stage& stage = *stage_;
-    const std::size_t n = std::min<std::size_t>(queue_.size(), kLanes);
+    const std::size_t n = std::min<std::size_t>(queue_.size() - oldest_, kLanes);
     std::array<PathRay, kLanes> rays;
-    std::copy(queue_.end() - std::ptrdiff_t(n), queue_.end(), rays.begin());
-    queue_.resize(queue_.size() - n);
+    std::copy_n(queue_.begin() + std::ptrdiff_t(oldest_), n, rays.begin());
+    oldest_ += n;
 
     const bool cuts = stage.cut && !stage.cut->empty();
     RayHit16 packet, open;
@@ -258,10 +267,10 @@ void Shader::trace_newest() {
 
     std::array<Hit, kLanes> hit;
     std::array<SurfacePoint, kLanes> surface;
-    std::array<Asker, kLanes> askers;
+    std::array<Asker, kLanes> askers[2]; ///< of samples that stand alone, and of those that are averaged
+    std::size_t asking[2] = {0, 0};
+    constexpr int kLit = 2 * kLanes;
     std::array<int, kLanes> asker_of; ///< -1: nothing to shade
-    std::size_t asking = 0;
-    bool all_spread = true; // sixteen of them make one sample: they are averaged as well
     for (int i = 0; i < int(n); ++i) {
         PathRay& ray = rays[std::size_t(i)];
         asker_of[std::size_t(i)] = -1;
@@ -282,15 +291,17 @@ void Shader::trace_newest() {
         const Material& m = stage.scene.materials[placement.mesh->material_of(h.triangle)];
         // Clear glass has no matte layer that shadows could fall on.
         const bool clear = m.transmission > 0.99f && m.transmission_texture.texture < 0;
-        asker_of[std::size_t(i)] = kLanes; // shaded as fully lit
+        asker_of[std::size_t(i)] = kLit; // shaded as fully lit
         if (m.unlit || clear) continue;
-        asker_of[std::size_t(i)] = int(asking);
-        all_spread &= ray.spread;
-        askers[asking++] = {p.position, p.start, p.flat_normal, p.normal, ray.in_hole, ray.pattern};
+        // Sixteen of the spread ones make one sample.
+        const int averaged = averaged_ || ray.spread ? 1 : 0;
+        asker_of[std::size_t(i)] = averaged * kLanes + int(asking[averaged]);
+        askers[averaged][asking[averaged]++] = {p.position, p.start, p.flat_normal, p.normal, ray.in_hole, ray.pattern};
     }
-    std::array<Reach, kLanes + 1> reach;
-    reach_of(std::span(askers.data(), asking), averaged_ || all_spread, reach.data());
-    reach[kLanes] = {};
+    std::array<Reach, kLit + 1> reach;
+    for (const int averaged : {0, 1})
+        reach_of(std::span(askers[averaged].data(), asking[averaged]), averaged != 0, reach.data() + averaged * kLanes);
+    reach[kLit] = {};
     for (std::size_t i = 0; i < n; ++i)
         if (asker_of[i] >= 0) add(rays[i], hit[i], surface[i], reach[std::size_t(asker_of[i])], false);
 }
@@ -301,6 +312,7 @@ void Shader::reach_of(std::span<const Asker> points, bool averaged, Reach* reach
         for (std::size_t i = 0; i < points.size(); ++i) reach[i] = occlusion.reach(points[i], *rays_);
         return;
     }
+    if (points.empty()) return;
     std::array<Vec3f, kLanes> lamps;
     std::array<Occlusion::Ambient, kLanes> ambient;
     occlusion.lamps(points, 1, lamps.data(), *rays_);

@@ -87,13 +87,14 @@ private:
                       Vec3f weight, bool body);
     void push(const PathRay& ray);
     void end_in_surroundings(const PathRay& ray);
-    void trace_newest();
+    void trace_oldest();
     void reach_of(std::span<const Asker> points, bool averaged, Reach* reach);
 
     const Stage* stage_;
     std::vector<Radiance> radiance_;
     bool averaged_;
     std::vector<PathRay> queue_;
+    std::size_t oldest_ = 0; ///< in the queue, of those not yet traced
     RayCounts* rays_;
 };
 
