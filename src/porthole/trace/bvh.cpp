@@ -9,6 +9,7 @@
 #include <cstring>
 #include <numeric>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "porthole/scene/texture.h"
@@ -117,12 +118,21 @@ struct Bvh::State {
 
 namespace {
 
+/// What a surface leaves of the light along one ray.
+struct Tinted {
+    int lane;
+    Vec3f tint;
+    friend bool operator<(const Tinted& a, const Tinted& b) {
+        return std::tie(a.lane, a.tint.x, a.tint.y, a.tint.z) < std::tie(b.lane, b.tint.x, b.tint.y, b.tint.z);
+    }
+};
+
 /// An Embree context that carries what the filters need.
 struct QueryContext {
     RTCIntersectContext rtc;
     const Bvh::State* bvh = nullptr;
     const Cut* cut = nullptr;
-    Vec3f* transmittance = nullptr;
+    std::vector<Tinted>* tints = nullptr;
     bool tinted_blocks = false; ///< blended and transmissive surfaces stop rays, as they do for ids
     detail::VisitCrossing visit_call = nullptr;
     void* visit = nullptr;
@@ -204,8 +214,7 @@ void occlusion_filter(const RTCFilterFunctionNArguments* args) {
             const Mesh& mesh = scene.mesh_of(c.part);
             const Material& material = scene.materials[mesh.material_of(c.triangle)];
             if (material.alpha_mode != AlphaMode::blend && !(material.transmission > 0)) continue;
-            if (query.transmittance)
-                query.transmittance[c.lane] *= transmission_tint(scene, mesh, c.triangle, c.u, c.v);
+            if (query.tints) query.tints->push_back({c.lane, transmission_tint(scene, mesh, c.triangle, c.u, c.v)});
             args->valid[i] = 0;
         }
     }
@@ -432,8 +441,13 @@ void occluded(const Bvh& bvh, RayHit16& rays, const Cut* cut, Vec3f* transmittan
         query.cut = cut;
         query.keep_world_rays(rays);
     }
-    query.transmittance = transmittance;
+    std::vector<Tinted> tints;
+    if (transmittance) query.tints = &tints;
     rtcOccluded16(valid, bvh.state().top.value, &query.rtc, reinterpret_cast<RTCRay16*>(&rays));
+    // In which order a ray meets surfaces depends on the rays beside it, and so would the last
+    // bit of the product.
+    std::sort(tints.begin(), tints.end());
+    for (const Tinted& t : tints) transmittance[t.lane] *= t.tint;
 }
 
 void occluded_by_any(const Bvh& bvh, RayHit16& rays) {
