@@ -4,6 +4,7 @@
 #include <array>
 #include <random>
 
+#include "porthole/io/load.h"
 #include "porthole/render/surface.h"
 #include "porthole/reveal.h"
 #include "support/shapes.h"
@@ -183,6 +184,56 @@ TEST(PrimitiveFlow, ThreadsAndWindowsChangeNothing) {
     const Revealed a = reveal(one, params, test::with_threads(1)), b = reveal(three, params, test::with_threads(3));
     EXPECT_EQ(a.frame.color, b.frame.color);
     EXPECT_EQ(a.frame.ids, b.frame.ids);
+}
+
+TEST(PrimitiveFlow, ThePapersSpheresAreOpenedAsThePaperSays) {
+    const Scene scene = load_scene(PORTHOLE_SOURCE_DIR "/examples/primitives/spheres.json");
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    RevealParams params;
+    for (std::uint32_t i = 0; i < scene.parts.size(); ++i)
+        if (scene.parts[i].name.starts_with("inner")) params.targets.push_back(PartId{i});
+    params.camera.name = "paper";
+    params.width = 600, params.height = 240;
+    params.render.samples = 1;
+    params.plan.style = HoleStyle::paper;
+    const Revealed paper = reveal(meshes, params);
+    ASSERT_EQ(paper.plan.targets.size(), 3u);
+    for (const TargetView& t : paper.plan.targets)
+        EXPECT_EQ(t.refused, scene.parts[index(t.part)].path == "tangent/inner tangent");
+    params.plan.style = HoleStyle::hole;
+    const Revealed hole = reveal(meshes, params);
+    EXPECT_EQ(hole.plan.opened.size(), 3u) << "the crescent that there is room for";
+    for (const auto& t : hole.report.targets) EXPECT_EQ(t.visible_after.value_or(0), 1.0);
+}
+
+TEST(PrimitiveFlow, TheHouseOpensAndNothingOutsideTheHoleChanges) {
+    const Scene scene = load_scene(PORTHOLE_SOURCE_DIR "/examples/primitives/house.json");
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    RevealParams params;
+    for (std::uint32_t i = 0; i < scene.parts.size(); ++i)
+        if (scene.parts[i].path.starts_with("furniture/dining/")) params.targets.push_back(PartId{i});
+    ASSERT_EQ(params.targets.size(), 7u);
+    params.camera.name = "street";
+    params.width = 300, params.height = 200;
+    params.render.samples = 2;
+    const Revealed r = reveal(meshes, params);
+    EXPECT_FALSE(r.plan.nothing_to_cut());
+    EXPECT_EQ(scene.parts[index(r.plan.cut_set.at(0))].name, "walls");
+    EXPECT_TRUE(r.plan.caps.open.empty()) << "primitives are closed";
+    const Bvh whole = build_bvh(meshes, all_parts(scene));
+    const Frame plain = render(whole, nullptr, r.plan.view, look_of(params), nullptr, nullptr);
+    std::size_t same = 0, changed = 0;
+    for (int y = 0; y < 200; ++y)
+        for (int x = 0; x < 300; ++x) {
+            if (r.plan.cut.distance_at(float(x) + 0.5f, float(y) + 0.5f) >= 1) {
+                ASSERT_EQ(r.frame.color(x, y), plain.color(x, y)) << x << ", " << y;
+                ++same;
+            } else {
+                changed += !(r.frame.color(x, y) == plain.color(x, y));
+            }
+        }
+    EXPECT_GT(same, 50000u);
+    EXPECT_GT(changed, 1000u);
 }
 
 } // namespace

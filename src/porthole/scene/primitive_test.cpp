@@ -150,6 +150,23 @@ TEST(Primitive, LinesInTheAxesMeetWhatTheyShould) {
     EXPECT_EQ(met, 2u);
 }
 
+TEST(Primitive, LinesThroughTheTipOfAConeMeetItTwice) {
+    Random random(8);
+    std::vector<PrimitiveCrossing> list;
+    for (int i = 0; i < 3000; ++i) {
+        const Affine3d placement = random_placement(random);
+        const PrimitiveTree cone = make_primitive(PrimitiveKind::frustum, 0, placement);
+        // Well inside, so that rounding at the tip cannot make the line miss.
+        const double r = uniform(random, 0, 0.9), a = uniform(random, 0, 6.28);
+        const Vec3d foot = placement.point({r * std::cos(a), -1, r * std::sin(a)}), tip = placement.point({0, 1, 0});
+        const Vec3d direction = i % 2 == 0 ? tip - foot : foot - tip;
+        const Vec3d origin = foot - direction * uniform(random, 0, 3);
+        find_crossings(cone, origin, direction, list);
+        ASSERT_EQ(list.size(), 2u);
+        EXPECT_NEAR(list[1].t - list[0].t, 1, 1e-6);
+    }
+}
+
 /// A tree and its definition, made at random.
 struct Made {
     PrimitiveTree tree;
@@ -299,6 +316,31 @@ TEST(Primitive, PointsComeBackFromTheirCoordinates) {
         }
     }
     EXPECT_GT(checked, 3000);
+}
+
+TEST(Primitive, WhatIsTakenAwayTwiceIsWhole) {
+    // A ball less a hollow in which a smaller ball is left.
+    const auto ball = [](double r) {
+        return make_primitive(PrimitiveKind::sphere, 0, {{r, 0, 0}, {0, r, 0}, {0, 0, r}, {}});
+    };
+    const PrimitiveTree gap[] = {ball(0.8), ball(0.5)};
+    const PrimitiveTree tree =
+        combine(CsgOperation::subtract, std::array{ball(1), combine(CsgOperation::subtract, gap)});
+    std::vector<PrimitiveCrossing> list;
+    find_crossings(tree, {0, 0, 3}, {0, 0, -1}, list);
+    const double at[] = {2, 2.2, 2.5, 3.5, 3.8, 4}, up[] = {1, -1, 1, -1, 1, -1};
+    ASSERT_EQ(list.size(), 6u);
+    for (std::size_t i = 0; i < 6; ++i) {
+        EXPECT_NEAR(list[i].t, at[i], 1e-12);
+        const Vec2f uv = surface_coordinates(tree, list[i].surface, {0, 0, 3 - list[i].t});
+        EXPECT_NEAR(surface_point(tree, list[i].surface, uv).normal.z, up[i], 1e-12) << i;
+    }
+}
+
+TEST(Primitive, HullsLeaveOutWhatIsTakenAway) {
+    const PrimitiveTree cut[] = {make_primitive(PrimitiveKind::sphere, 0, {}),
+                                 make_primitive(PrimitiveKind::box, 0, {{9, 0, 0}, {0, 9, 0}, {0, 0, 9}, {0, 9.5, 0}})};
+    for (const Vec3f p : hull_points(combine(CsgOperation::subtract, cut))) EXPECT_LT(length(p), 1.02f);
 }
 
 TEST(Primitive, SamplesAreSpreadOverTheSurface) {
