@@ -16,7 +16,7 @@ Frame CutFrame::draw_hole(bool capped, const RenderParams& params, const Frame& 
     Bvh opened = build_bvh(*subject->meshes, all_parts(subject->scene()), plan.cut.role, plan.cut.level);
     Caps caps;
     if (capped) {
-        caps = trace_caps(opened, plan.cut, plan.solids, control);
+        caps = trace_caps(opened, plan.cut, plan.solids, plan.target_ids.id, control);
         add_caps(opened, caps.mesh);
     }
     return render(opened, targets.get(), view, params, &plan.cut, &around, control, &caps);
@@ -48,7 +48,7 @@ AbsentScene::AbsentScene(const CutFrame& cut) : scene(cut.subject->scene()) {
         scene.meshes.push_back(std::move(mesh));
     }
     const Bvh opened = build_bvh(*cut.subject->meshes, all_parts(cut.subject->scene()), c.role, c.level);
-    const CapMesh caps = trace_caps(opened, c, cut.plan.solids).mesh;
+    const CapMesh caps = trace_caps(opened, c, cut.plan.solids, cut.plan.target_ids.id).mesh;
     Mesh mesh;
     mesh.positions = caps.positions;
     mesh.triangles = caps.triangles;

@@ -69,7 +69,8 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
     // The plain picture first; the hole is drawn over it, so nothing changes outside.
     const RenderParams look = look_of(params);
     Bvh opened = build_bvh(meshes, all_parts(scene), revealed.plan.cut.role, revealed.plan.cut.level);
-    const Caps caps = trace_caps(opened, revealed.plan.cut, revealed.plan.solids, control, &revealed.plan.rays.caps);
+    const Caps caps = trace_caps(opened, revealed.plan.cut, revealed.plan.solids, revealed.plan.target_ids.id, control,
+                                  &revealed.plan.rays.caps);
     add_caps(opened, caps.mesh);
     Frame plain;
     if (!revealed.plan.nothing_revealed()) {

@@ -41,6 +41,8 @@ Vec2i nearest_inside(const Image<float>& distance, float x, float y) {
     return nearest;
 }
 
+constexpr float kLightSlack = 1; ///< pixel sizes
+
 /// Floors that differ by more pixel sizes than this are a step, not a slope.
 constexpr float kStep = 16;
 
@@ -95,13 +97,14 @@ bool Cut::removes(Vec3f world, PartId part) const {
     const PixelPoint p = view.project(world);
     if (!(p.depth > 0) && !view.orthographic) return false;
     if (!(std::abs(p.x) < 1e8f) || !(std::abs(p.y) < 1e8f)) return false;
+    const float depth = p.depth - kLightSlack * view.pixel_size(p.depth);
     if (which == CutRole::cut_set && !ranges.empty()) {
         const CutRange range = ranges[level_of(part)].at_or(int(std::floor(p.x)), int(std::floor(p.y)), CutRange{});
-        if (p.depth < range.near) return true;
-        if (!(p.depth < range.far)) return false;
+        if (depth < range.near) return true;
+        if (!(depth < range.far)) return false;
     }
     if (distance_at(p.x, p.y) > 0) return false;
-    return p.depth < (which == CutRole::loose ? loose_depth_at(p.x, p.y) : depth_at(p.x, p.y, level_of(part)).depth);
+    return depth < (which == CutRole::loose ? loose_depth_at(p.x, p.y) : depth_at(p.x, p.y, level_of(part)).depth);
 }
 
 void index_ranges(Cut& cut) {

@@ -85,8 +85,10 @@ struct Cut {
     [[nodiscard]] CutDepth depth_at(float x, float y, std::size_t level) const;
     /// The loose depth of the pixel, or of the nearest one across the rim.
     [[nodiscard]] float loose_depth_at(float x, float y) const;
-    /// Whether the point `world` of `part` is gone: it is in front of the eye, projects into
-    /// the hole, and is nearer than the cut (loose) depth there. Exact at pixel centres.
+    /// Whether the point `world` of `part` is gone for light: it is in front of the eye, projects
+    /// into the hole, and is nearer than the cut (loose) depth there, or behind the cut by less
+    /// than a pixel's size: what lies on the cut surface, such as the half of a shaft that is
+    /// left in its bore, would only speckle it.
     [[nodiscard]] bool removes(Vec3f world, PartId part) const;
 };
 

@@ -58,14 +58,17 @@ SurfacePoint cap_point(const Cut& cut, std::size_t level, float x, float y, floa
         float before = depth, after = depth;
         const bool has_before = joined(-1, before), has_after = joined(1, after);
         if (!has_before && !has_after) return false;
-        if (has_before && has_after) bend = std::max(bend, 2 * std::abs(before - 2 * depth + after));
+        if (has_before && has_after)
+            bend = std::max(bend, 2 * std::abs(before - 2 * depth + after) / std::max(1.0f, dx + dy));
         along = (has_after ? at(x + dx, y + dy, after) : point.position) -
                 (has_before ? at(x - dx, y - dy, before) : point.position);
         return true;
     };
     Vec3f right, down;
     Vec3f normal = to_eye;
-    if (slope(0.5f, 0, right) && slope(0, 0.5f, down)) normal = normalize(cross(right, down), to_eye);
+    // Floors are smoothed over many pixels, and what is left of their steps must not show.
+    const float reach = own.chamfer ? 0.5f : 3.0f;
+    if (slope(reach, 0, right) && slope(0, reach, down)) normal = normalize(cross(right, down), to_eye);
     if (dot(normal, to_eye) < 0) normal = -normal;
     point.flat_normal = point.normal = normal;
     const float pixel = view.pixel_size(depth);

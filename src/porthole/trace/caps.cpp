@@ -18,10 +18,15 @@ constexpr float kChamferStep = 2, kFloorStep = 16; ///< pixel sizes
 struct CappedLevels {
     std::uint32_t mask = 0; ///< ray mask
     bool any[kMostLevels] = {}, solids[kMostLevels] = {};
+    bool doubtful = false; ///< among them parts with gaps: rays must be followed to their end
     [[nodiscard]] bool at(std::size_t level, bool chamfer) const { return chamfer ? any[level] : solids[level]; }
 };
 
-CappedLevels capped_levels(const Cut& cut) {
+/// Whether some rays find the part's surface open, so that one which went into it may have come
+/// out through a gap.
+bool has_gaps(const MeshSolid& solid) { return solid.by == ClosedBy::rays && solid.balanced_lines < solid.lines; }
+
+CappedLevels capped_levels(const Scene& scene, const Cut& cut, std::span<const MeshSolid> solids) {
     CappedLevels capped;
     for (std::size_t i = 0; i < cut.cap.size(); ++i) {
         if (cut.cap[i] == CapRule::none || cut.role[i] != CutRole::cut_set) continue;
@@ -29,6 +34,7 @@ CappedLevels capped_levels(const Cut& cut) {
         capped.any[level] = true;
         capped.solids[level] |= cut.cap[i] == CapRule::solid;
         capped.mask |= level_mask(level);
+        capped.doubtful |= has_gaps(solids[scene.parts[i].mesh]);
     }
     return capped;
 }
@@ -51,18 +57,37 @@ bool is_repeated(const Passage& a, const Passage& b) {
 /// By lane, in order of t.
 using Passages = std::array<std::vector<Passage>, kLanes>;
 
-/// Passages of the active lanes up to their tfar.
-void find_passages(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids, RayHit16& rays,
-                   Passages& passages) {
+/// Leaves out the passages of parts with gaps where the whole ray does not enter and leave in turn.
+void drop_unbalanced(const Scene& scene, std::span<const MeshSolid> solids, std::vector<Passage>& lane) {
+    std::vector<PartId> unsound;
+    for (const Passage& first : lane) {
+        const PartId part = first.surface.part;
+        if (!has_gaps(solids[scene.parts[index(part)].mesh])) continue;
+        int inside = 0;
+        bool sound = true;
+        for (const Passage& p : lane)
+            if (p.surface.part == part) inside -= p.sign, sound = sound && inside >= 0;
+        if (!sound || inside != 0) unsound.push_back(part);
+    }
+    std::erase_if(lane, [&](const Passage& p) {
+        return std::find(unsound.begin(), unsound.end(), p.surface.part) != unsound.end();
+    });
+}
+
+/// Passages of the active lanes up to their tfar; to their end if parts are doubtful.
+void find_passages(const Bvh& bvh, const Cut& cut, const CappedLevels& capped, std::span<const MeshSolid> solids,
+                   RayHit16& rays, Passages& passages) {
     for (std::vector<Passage>& lane : passages) lane.clear();
     const Scene& scene = bvh.scene();
+    for (int i = 0; i < kLanes && capped.doubtful; ++i)
+        if (rays.active(i)) rays.tfar[i] = kInfinity;
     for_each_crossing(bvh, rays, [&](const Crossing& c) {
         if (cut.cap_of(c.part) == CapRule::none) return;
         const int sign = crossing_sign(solids[scene.parts[index(c.part)].mesh], c.triangle, c.entering);
         if (sign != 0) passages[std::size_t(c.lane)].push_back({c.t, sign, {c.part, c.triangle, c.u, c.v}});
     });
     for (std::vector<Passage>& lane : passages) {
-        if (lane.size() < 2) continue;
+        if (lane.empty()) continue;
         std::sort(lane.begin(), lane.end(), [](const Passage& a, const Passage& b) {
             if (a.t != b.t) return a.t < b.t;
             if (a.surface.part != b.surface.part) return index(a.surface.part) < index(b.surface.part);
@@ -70,6 +95,7 @@ void find_passages(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> so
             return a.surface.triangle < b.surface.triangle;
         });
         lane.erase(std::unique(lane.begin(), lane.end(), is_repeated), lane.end());
+        if (capped.doubtful) drop_unbalanced(scene, solids, lane);
     }
 }
 
@@ -141,7 +167,7 @@ bool is_cut_step(const View& view, const CutDepth& a, const CutDepth& b) {
 CapLanes find_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids, RayHit16& rays,
                    const CutLanes& lanes) {
     CapLanes caps;
-    const CappedLevels capped = capped_levels(cut);
+    const CappedLevels capped = capped_levels(bvh.scene(), cut, solids);
     if (capped.mask == 0) return caps;
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {
@@ -153,7 +179,7 @@ CapLanes find_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> so
     }
     if (!any) return caps;
     Passages passages;
-    find_passages(bvh, cut, solids, rays, passages);
+    find_passages(bvh, cut, capped, solids, rays, passages);
     Inside inside;
     for (int i = 0; i < kLanes; ++i) {
         const std::vector<Passage>& lane = passages[std::size_t(i)];
@@ -250,8 +276,9 @@ private:
 /// Rays of one tile: caps at its pixel centres, walls of its pixels.
 class TileCaps {
 public:
-    TileCaps(const Bvh& bvh, const Cut& cut, const CappedLevels& capped, Caps& caps, CapMesh& mesh)
-        : bvh_(bvh), cut_(cut), capped_(capped), caps_(caps), mesh_(cut, bvh.scene(), mesh) {}
+    TileCaps(const Bvh& bvh, const Cut& cut, const CappedLevels& capped, const Image<PartId>& targets, Caps& caps,
+             CapMesh& mesh)
+        : bvh_(bvh), cut_(cut), capped_(capped), targets_(targets), caps_(caps), mesh_(cut, bvh.scene(), mesh) {}
 
     std::int64_t trace_block(Rect tile, int x0, int y0) {
         RayHit16 rays;
@@ -261,6 +288,7 @@ public:
             rays.clear(i);
             const int x = x0 + (i & 3), y = y0 + (i >> 2);
             if (!tile.contains(x, y) || cut_.distance.at_or(x, y, 1.0f) > 0) continue;
+            if (targets_.at_or(x, y, kNoPart) != kNoPart) continue;
             const float depth = deepest_around(x, y);
             if (!(depth > 0) && !cut_.view.orthographic) continue;
             const Ray ray = cut_.view.ray(float(x) + 0.5f, float(y) + 0.5f);
@@ -269,7 +297,7 @@ public:
             n += rays.active(i);
         }
         if (n == 0) return 0;
-        find_passages(bvh_, cut_, caps_.solids, rays, passages_);
+        find_passages(bvh_, cut_, capped_, caps_.solids, rays, passages_);
         for (int i = 0; i < kLanes; ++i) {
             const std::vector<Passage>& lane = passages_[std::size_t(i)];
             if (lane.empty()) continue;
@@ -377,6 +405,7 @@ private:
     const Bvh& bvh_;
     const Cut& cut_;
     const CappedLevels& capped_;
+    const Image<PartId>& targets_;
     Caps& caps_;
     TileMesh mesh_;
     Passages passages_;
@@ -415,11 +444,11 @@ void append(CapMesh& all, const CapMesh& piece) {
 
 } // namespace
 
-Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids, const Control& control,
-                std::int64_t* rays) {
+Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids, const Image<PartId>& targets,
+                const Control& control, std::int64_t* rays) {
     Caps caps;
     if (cut.empty()) return caps;
-    const CappedLevels capped = capped_levels(cut);
+    const CappedLevels capped = capped_levels(bvh.scene(), cut, solids);
     const Rect box = hole_box(cut);
     if (capped.mask == 0 || box.empty()) return caps;
     caps.solids = solids;
@@ -438,7 +467,7 @@ Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solid
     };
     std::atomic<std::int64_t> traced{0};
     parallel_for_tiles(box, kTile, control, [&](Rect tile) {
-        TileCaps work(bvh, cut, capped, caps, piece_of(tile));
+        TileCaps work(bvh, cut, capped, targets, caps, piece_of(tile));
         std::int64_t n = 0;
         for (int y = tile.y0 & ~3; y < tile.y1; y += 4)
             for (int x = tile.x0 & ~3; x < tile.x1; x += 4) n += work.trace_block(tile, x, y);

@@ -24,7 +24,8 @@ struct CapLanes {
 ///
 /// A ray is inside a part when on its way it entered the part's closed components more often
 /// than it left them. Of several parts the one that was entered last is innermost; ties by
-/// lower id. The surface named is where it was entered.
+/// lower id. The surface named is where it was entered. Of parts with gaps (closed by rays, but
+/// not by all) only rays count that enter and leave them in turn along their whole way.
 ///
 /// @param bvh     built with the roles and levels of `cut`.
 /// @param solids  by mesh index, judged for the meshes of the cut set; others are not asked.
@@ -52,12 +53,15 @@ struct Caps {
     }
 };
 
+/// @param targets  ids of the opened targets, any window: where they are seen, the cut ends on them
+///                 and no cap is made. May be empty.
 /// @return empty when no part of the cut set is capped.
 /// Cost: one find_caps() ray a pixel of the hole, 16 bytes a pixel and level of its box.
 /// The same for any number of threads.
 /// @throws Cancelled.
 [[nodiscard]] Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids,
-                              const Control& control = {}, std::int64_t* rays = nullptr);
+                              const Image<PartId>& targets = {}, const Control& control = {},
+                              std::int64_t* rays = nullptr);
 
 /// Whether depths `a` and `b` of neighbouring pixels of one level are parted by a wall of the
 /// cut rather than joined by its slope.

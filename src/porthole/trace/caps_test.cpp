@@ -222,6 +222,31 @@ TEST(Caps, OfAShellOnTheChamferOnly) {
 
 TEST(Caps, NoneOfAnOpenPart) { EXPECT_EQ(expect_caps(Bench({{.blocks = {kLarge}, .rule = CapRule::none}})), 0); }
 
+TEST(Caps, NoneBehindAGapOfAPartThatIsClosedByMostRays) {
+    Bench bench({{.blocks = {kLarge}}});
+    // The face away from the eye is gone: no ray that goes in comes out again.
+    Mesh& mesh = bench.scene.meshes[0];
+    std::erase_if(mesh.triangles, [&](Vec3u t) {
+        const auto far = [&](std::uint32_t v) { return mesh.positions[v].z == float(kLarge.lower.z); };
+        return far(t.x) && far(t.y) && far(t.z);
+    });
+    mesh.submeshes[0].triangle_count = std::uint32_t(mesh.triangles.size());
+    MeshSolid& solid = bench.solids[0];
+    solid.by = ClosedBy::rays;
+    solid.lines = 300, solid.balanced_lines = 290;
+    const MeshBvhs meshes = build_mesh_bvhs(bench.scene);
+    const Bvh bvh = build_bvh(meshes, all_parts(bench.scene), bench.cut.role, bench.cut.level);
+    const auto capped = [&] {
+        int n = 0;
+        const Caps caps = trace_caps(bvh, bench.cut, bench.solids);
+        for (const SurfaceRef& s : caps.levels[0].pixels()) n += s.part != kNoPart;
+        return n;
+    };
+    const int guarded = capped();
+    solid.balanced_lines = 300; // as if no ray had found the gap
+    EXPECT_LT(guarded, capped() / 4);
+}
+
 TEST(Caps, OfTwoLevels) {
     const Bench bench(
         {{.blocks = {kLarge}, .cavities = {kSmall}}, {.blocks = {{{-0.5, -0.4, -0.3}, {0.6, 0.3, 0.4}}}, .level = 1}});
@@ -232,8 +257,8 @@ TEST(Caps, AreTheSameForAnyNumberOfThreads) {
     const Bench bench({{.blocks = {kLarge}}, {.blocks = {kSmall}}});
     const MeshBvhs meshes = build_mesh_bvhs(bench.scene);
     const Bvh bvh = build_bvh(meshes, all_parts(bench.scene), bench.cut.role, bench.cut.level);
-    const Caps one = trace_caps(bvh, bench.cut, bench.solids, test::with_threads(1));
-    const Caps many = trace_caps(bvh, bench.cut, bench.solids, test::with_threads(7));
+    const Caps one = trace_caps(bvh, bench.cut, bench.solids, {}, test::with_threads(1));
+    const Caps many = trace_caps(bvh, bench.cut, bench.solids, {}, test::with_threads(7));
     EXPECT_EQ(one.levels, many.levels);
     EXPECT_EQ(one.mesh.positions, many.mesh.positions);
     EXPECT_EQ(one.mesh.triangles, many.mesh.triangles);
