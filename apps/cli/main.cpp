@@ -160,15 +160,22 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
     add_list(app, "--cut-only", o.cut_only, "Cut no parts but these; may be given several times");
     add_choice<bool>(app, "--see-through", o.keep_see_through, {{"cut", false}, {"keep", true}},
                      "Glass and other see-through parts: cut or kept whole (default cut)");
+    add_choice<Rest>(app, "--rest", o.rest,
+                     {{"keep", Rest::keep}, {"dim", Rest::dim}, {"line", Rest::line}, {"ghost", Rest::ghost}},
+                     "Parts that are neither targets, kept nor cut: as they are, paler, lines alone, or a thin shell "
+                     "(default keep)");
     app.option_defaults()->group("Hole");
     add_read(app, "--depth", "Width of the band that the hole adds around targets (default 5% of the picture's height)",
              "N[px|%|mm]",
              [&o](const std::string& text, const std::string& option) { o.plan.depth = parse_length(text, option); });
     add_choice<HoleStyle>(
         app, "--style", o.plan.style,
-        {{"cutaway", HoleStyle::cutaway}, {"hole", HoleStyle::hole}, {"paper", HoleStyle::paper}},
+        {{"cutaway", HoleStyle::cutaway},
+         {"hole", HoleStyle::hole},
+         {"paper", HoleStyle::paper},
+         {"ghost", HoleStyle::ghost}},
         "cutaway: a readable window with a chamfered rim; hole: straight walls along the outline; paper: as the "
-        "paper builds it (default cutaway)");
+        "paper builds it; ghost: no hole, what hides targets is a thin shell (default cutaway)");
     add_choice<HoleShape>(
         app, "--shape", o.plan.shape,
         {{"smooth", HoleShape::smooth},
@@ -205,8 +212,10 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
         app, "--contours", o.plan.contours,
         {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},
         "How targets' outlines are found (default exact)");
-    add_choice<Tight>(app, "--tight", o.plan.tight, {{"refuse", Tight::refuse}, {"open", Tight::open}},
-                      "Targets without room for a band: refused, or opened all the same (default refuse)");
+    add_choice<Tight>(app, "--tight", o.plan.tight,
+                      {{"refuse", Tight::refuse}, {"open", Tight::open}, {"ghost", Tight::ghost}},
+                      "Targets without room for a band: refused, or opened all the same; ghost: the whole picture in "
+                      "style ghost then (default refuse)");
     app.add_flag("--strict", o.strict, "Exit 8 if some target is refused or absent, not only if all are");
     app.add_option("--debug-dir", o.debug_dir, "Write every value of the plan as a picture")->type_name("DIR");
     add_picture(app, o.picture);

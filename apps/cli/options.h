@@ -41,6 +41,7 @@ struct RevealOptions {
     std::vector<std::string> target, keep, cut_only, solid, shell; ///< selectors
     PlanParams plan;
     bool keep_see_through = false;
+    Rest rest = Rest::keep;
     bool strict = false;
     std::string debug_dir; ///< empty: none
 };
@@ -51,8 +52,8 @@ struct RenderOptions {
     CommonOptions common;
     PictureOptions picture;
     Mode mode = Mode::raytraced;
-    WireParams wire;                ///< its background comes from `picture`
-    std::vector<std::string> focus; ///< selectors of parts that the picture is framed on
+    WireParams wire{.wire = Wire::automatic}; ///< of mode wireframe
+    std::vector<std::string> focus;           ///< selectors of parts that the picture is framed on
 };
 
 struct PartsOptions {

@@ -26,13 +26,12 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
 
     const Stopwatch drawing;
     out.progress("render", 0);
-    RenderParams look = picture.render;
-    if (options.mode == RenderOptions::Mode::flat) look.shading = Shading::flat;
-    WireParams wire = options.wire;
-    wire.background = look.background;
-    const Frame frame = options.mode == RenderOptions::Mode::wireframe
-                            ? render_wireframe(meshes, all_parts(scene), view, wire, control)
-                            : render(whole, nullptr, view, look, nullptr, nullptr, control);
+    RevealParams params;
+    params.render = picture.render;
+    params.wire = options.wire;
+    if (options.mode == RenderOptions::Mode::flat) params.render.shading = Shading::flat;
+    if (options.mode != RenderOptions::Mode::wireframe) params.wire.wire = Wire::none;
+    const Frame frame = render_plain(meshes, whole, view, params, control);
     report.run.render = drawing.seconds();
 
     const Stopwatch writing;
@@ -44,7 +43,8 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     report.run.write = writing.seconds();
 
     report.view = view;
-    report.options.render = look;
+    report.options.render = params.render;
+    report.options.wire = params.wire;
     report.nothing_to_cut = true;
     report.frame_rays = frame.rays;
     report.run.threads = thread_count(control);

@@ -50,7 +50,9 @@ std::size_t tell_targets(Report& report, const RevealOptions& options) {
             report.warnings.push_back(
                 {"W0105", target.path,
                  "refused: " + target.refused + " for a hole" +
-                     (options.plan.tight == Tight::refuse ? "; --tight open opens it all the same" : "")});
+                     (options.plan.tight == Tight::refuse
+                          ? "; --tight open opens it all the same, --tight ghost shows it through thin walls"
+                          : "")});
         }
     }
     return opened;
@@ -61,7 +63,7 @@ std::string percent(double share) {
     return std::to_string(int(std::floor(share * 100 + 1e-9))) + " %";
 }
 
-std::string summary(const Report& report) {
+std::string summary(const Report& report, bool ghost) {
     double before = 0, after = 0;
     int n = 0;
     for (const TargetReport& target : report.targets)
@@ -71,8 +73,9 @@ std::string summary(const Report& report) {
     return with_commas(n) + (n == 1 ? " target" : " targets") + ", visible " + percent(before / n) + " -> " +
            percent(after / n) +
            (report.nothing_to_cut ? "; nothing hides them, so there is no hole"
+            : ghost               ? "; through " + with_commas(std::int64_t(report.cut_parts.size())) + " thin parts"
                                   : "; hole of " + with_commas(report.picture.hole_pixels) + " px through " +
-                                        with_commas(std::int64_t(report.cut_parts.size())) + " parts");
+                          with_commas(std::int64_t(report.cut_parts.size())) + " parts");
 }
 
 } // namespace
@@ -90,6 +93,7 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
     params.keep = select_and_tell(scene, options.keep, "--keep", out);
     params.cut_only = select_and_tell(scene, options.cut_only, "--cut-only", out);
     params.keep_see_through = options.keep_see_through;
+    params.rest = options.rest;
     params.camera = picture.camera;
     params.width = picture.size.x, params.height = picture.size.y;
     params.plan = options.plan;
@@ -124,7 +128,7 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
                    "nothing revealed: every target is absent or refused; no picture was written"});
         return kExitNothingRevealed;
     }
-    out.info(summary(report) + ", " + in_seconds(report.run.total));
+    out.info(summary(report, revealed.plan.ghost) + ", " + in_seconds(report.run.total));
     return options.strict && opened < report.targets.size() ? kExitNothingRevealed : kExitDone;
 }
 

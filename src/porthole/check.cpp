@@ -192,8 +192,9 @@ bool holds_target(const Bvh& targets, const View& view, int x, int y) {
 }
 
 /// The picture against the plain one beside the hole and against the reveal at the hole.
+/// @param restyled  beside the hole, too, it is not the plain picture.
 void compare_picture(const CheckParams& params, const View& view, const Mask& hole, const Bvh* targets,
-                     const Frame& plain, const Frame& opened, Comparison& comparison, Checked& checked) {
+                     const Frame& plain, const Frame& opened, bool restyled, Comparison& comparison, Checked& checked) {
     const Image<Rgba16>& file = *params.picture;
     if (file.width() != view.width || file.height() != view.height)
         return comparison.differ("picture inside", "size",
@@ -201,7 +202,7 @@ void compare_picture(const CheckParams& params, const View& view, const Mask& ho
                                  std::to_string(file.width()) + 'x' + std::to_string(file.height()) + " in the file");
     const Mask touched = grown_by_one(hole, view.window());
     const Image<Rgba16> inside = params.as_in_file(opened);
-    const Image<Rgba16> outside = params.lossy ? inside : params.as_in_file(plain);
+    const Image<Rgba16> outside = params.lossy || restyled ? inside : params.as_in_file(plain);
     for (int y = 0; y < view.height; ++y)
         for (int x = 0; x < view.width; ++x) {
             bool in = touched(x, y) != 0;
@@ -250,6 +251,8 @@ void compare_dense(const Report& reported, const ViewPlan& plan, const DenseView
             see_through += dense.before(x, y) && !dense.after(x, y);
         }
     comparison.figure("/picture/hole_pixels", plan.cut.empty() ? 0 : in_picture);
+    // Thin shells hide the background as the whole parts do.
+    if (plan.ghost || reported.options.rest == Rest::ghost) return;
     comparison.figure("/picture/see_through_px", see_through);
     comparison.figure("/picture/outline_iou", dense_outline_iou(dense.before, dense.after));
 }
@@ -290,7 +293,8 @@ void check_reveal(const MeshBvhs& meshes, const Report& reported, const CheckPar
     if (params.picture && !again.plan.nothing_revealed()) {
         const Frame plain = render(subject.whole, nullptr, *options.view, look_of(options), nullptr, nullptr, control);
         const Bvh targets = build_bvh(meshes, again.plan.opened);
-        compare_picture(params, *options.view, again.plan.hole.mask, &targets, plain, again.frame, comparison, checked);
+        compare_picture(params, *options.view, again.plan.hole.mask, &targets, plain, again.frame,
+                        again.plan.ghost || options.rest != Rest::keep, comparison, checked);
     }
     comparison.rest(again.report);
 }
@@ -299,8 +303,8 @@ void check_render(const MeshBvhs& meshes, const Report& reported, const CheckPar
                   Checked& checked, const Control& control) {
     const View& view = *reported.options.view;
     const Bvh whole = build_bvh(meshes, all_parts(meshes.scene()));
-    const Frame frame = render(whole, nullptr, view, reported.options.render, nullptr, nullptr, control);
-    if (params.picture) compare_picture(params, view, {}, nullptr, frame, frame, comparison, checked);
+    const Frame frame = render_plain(meshes, whole, view, reported.options, control);
+    if (params.picture) compare_picture(params, view, {}, nullptr, frame, frame, false, comparison, checked);
     Report found;
     found.model.parts = std::int64_t(meshes.scene().parts.size());
     found.model.triangles = std::int64_t(triangle_count(meshes.scene()));

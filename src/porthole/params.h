@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "porthole/plan.h"
-#include "porthole/render/render.h"
+#include "porthole/render/restyle.h"
+#include "porthole/render/wireframe.h"
 #include "porthole/scene/camera.h"
 
 namespace porthole {
@@ -15,11 +16,13 @@ struct RevealParams {
     std::vector<PartId> keep;      ///< parts that stay whole
     std::vector<PartId> cut_only;  ///< if not empty, only these may be cut
     bool keep_see_through = false; ///< blended and transmissive parts stay whole too
+    Rest rest = Rest::keep;        ///< how parts look that are neither targets, kept nor cut
     CameraParams camera;           ///< name "auto": chosen by the plan
     int width = 1920, height = 1080;
     std::optional<View> view{}; ///< instead of camera, width and height: this very view
     PlanParams plan;
     RenderParams render;
+    WireParams wire; ///< of a picture without a hole: edges instead of surfaces
 };
 
 } // namespace porthole

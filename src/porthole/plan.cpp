@@ -293,6 +293,7 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     const Scene& scene = subject.scene();
     ViewPlan plan;
     plan.view = view;
+    plan.ghost = params.style == HoleStyle::ghost;
     plan.depth_px = band_depth_px(subject, view, params);
     const HoleParams band{.depth_px = plan.depth_px, .blur_px = 0.025f * float(view.height)};
     const CutawayMargins margins = params.style == HoleStyle::cutaway
@@ -318,9 +319,14 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     // what it covered may have become visible, what only it needed stays whole.
     for (;;) {
         plan_opened_group(subject, params, band, windows, blocks, plan, control);
-        if (params.tight == Tight::open || plan.cut_set.empty()) return plan;
+        if (params.tight == Tight::open || plan.ghost || plan.cut_set.empty()) return plan;
         std::vector<PartId> refused = no_room(plan, params);
         if (refused.empty()) return plan;
+        if (params.tight == Tight::ghost) {
+            PlanParams ghost = params;
+            ghost.style = HoleStyle::ghost;
+            return plan_view(subject, view, ghost, control);
+        }
         for (TargetView& target : plan.targets)
             if (std::find(refused.begin(), refused.end(), target.part) != refused.end()) {
                 target.refused = true;

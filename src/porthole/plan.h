@@ -28,12 +28,14 @@ enum class ContourMethod : std::uint8_t {
 enum class HoleStyle : std::uint8_t {
     cutaway, ///< countersunk: a readable window, a chamfer at the rim as wide as the wall deserves, steps
     hole,    ///< straight walls around the targets' silhouette, width clamped at every contour pixel
-    paper    ///< N_k, P_k, F_k, one width per target, flat shading
+    paper,   ///< N_k, P_k, F_k, one width per target, flat shading
+    ghost    ///< no hole: what lies in front of targets is drawn as a thin shell; planned as `hole`, never refused
 };
 
 enum class Tight : std::uint8_t {
     refuse, ///< a target without room stays closed, and the report says so
-    open    ///< it is opened all the same
+    open,   ///< it is opened all the same
+    ghost   ///< the whole picture is planned and drawn in style ghost instead
 };
 
 /// A length as users give it: "54px", "5%" of the picture's height, "3mm" at the targets' depth.
@@ -91,9 +93,11 @@ struct TargetView {
 
 struct ViewPlan {
     View view;
-    int depth_px = 0;                ///< width of the band asked for
-    Rect whole;                      ///< picture and margin
-    Rect window;                     ///< the part of picture and margin that the hole can touch; all images below
+    bool ghost = false; ///< the cut set is to be drawn as a thin shell; hole and cut only say where it hides
+                        ///< the targets
+    int depth_px = 0;   ///< width of the band asked for
+    Rect whole;         ///< picture and margin
+    Rect window;        ///< the part of picture and margin that the hole can touch; all images below
     std::vector<TargetView> targets; ///< in the order of Subject::targets
     std::vector<PartId> opened;      ///< targets neither absent nor refused
     IdBuffer target_ids;             ///< opened targets only

@@ -21,6 +21,7 @@ inline const char* name_of(HoleStyle style) {
     case HoleStyle::cutaway: return "cutaway";
     case HoleStyle::hole: return "hole";
     case HoleStyle::paper: return "paper";
+    case HoleStyle::ghost: return "ghost";
     }
     return nullptr;
 }
@@ -37,6 +38,7 @@ inline const char* name_of(Tight tight) {
     switch (tight) {
     case Tight::refuse: return "refuse";
     case Tight::open: return "open";
+    case Tight::ghost: return "ghost";
     }
     return nullptr;
 }
@@ -69,6 +71,31 @@ inline const char* name_of(Lines lines) {
     case Lines::none: return "none";
     case Lines::rim: return "rim";
     case Lines::all: return "all";
+    }
+    return nullptr;
+}
+inline const char* name_of(Rest rest) {
+    switch (rest) {
+    case Rest::keep: return "keep";
+    case Rest::dim: return "dim";
+    case Rest::line: return "line";
+    case Rest::ghost: return "ghost";
+    }
+    return nullptr;
+}
+inline const char* name_of(Wire wire) {
+    switch (wire) {
+    case Wire::none: return "none";
+    case Wire::automatic: return "auto";
+    case Wire::mesh: return "mesh";
+    case Wire::feature: return "feature";
+    }
+    return nullptr;
+}
+inline const char* name_of(HiddenLines hidden) {
+    switch (hidden) {
+    case HiddenLines::none: return "none";
+    case HiddenLines::dashed: return "dashed";
     }
     return nullptr;
 }
@@ -118,14 +145,18 @@ template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& v
 }
 
 template <Is<RevealParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
-    auto& [targets, keep, cut_only, keep_see_through, camera, width, height, view, plan, render] = params;
+    auto& [targets, keep, cut_only, keep_see_through, rest, camera, width, height, view, plan, render, wire] = params;
     (void)camera, (void)width, (void)height, (void)view; // the report's camera and size say where from
     visit("targets", targets);
     visit("keep", keep);
     visit("cut_only", cut_only);
     visit("keep_see_through", keep_see_through);
+    visit("rest", rest);
     for_each(plan, visit);
     for_each(render, visit);
+    visit("wire", wire.wire);
+    visit("hidden_lines", wire.hidden);
+    visit("wire_px", wire.width_px);
 }
 
 } // namespace porthole::fields

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "porthole/viewpoint.h"
 
@@ -29,6 +30,29 @@ std::vector<PartId> kept_parts(const Scene& scene, const RevealParams& params) {
     return kept;
 }
 
+/// 1 for parts that are neither targets, nor kept, nor cut.
+std::vector<std::uint8_t> rest_of(const Scene& scene, const RevealParams& params, const ViewPlan& plan) {
+    std::vector<std::uint8_t> rest(scene.parts.size(), 1);
+    for (const std::vector<PartId>& others : {params.targets, kept_parts(scene, params), plan.cut_set})
+        for (const PartId id : others) rest[index(id)] = 0;
+    return rest;
+}
+
+/// The pictures of a plan. The plain one is `around` the hole; the hole is drawn over it, so
+/// nothing changes outside.
+/// @param whole   hierarchy of all that is solid.
+/// @param opened  the same with the roles of the plan's cut.
+Frame draw(const ViewPlan& plan, const Bvh& whole, const Bvh& opened, const Bvh& targets, const Caps& caps,
+           const RenderParams& look, Frame* around, const Control& control) {
+    if (plan.ghost && !plan.nothing_to_cut())
+        return render(whole, &targets, plan.view, look, nullptr, nullptr, control);
+    Frame plain = render_around(whole, plan.view, look, plan.cut, control);
+    Frame frame =
+        plan.nothing_to_cut() ? plain : render(opened, &targets, plan.view, look, &plan.cut, &plain, control, &caps);
+    if (around) *around = std::move(plain);
+    return frame;
+}
+
 } // namespace
 
 Subject make_subject(const MeshBvhs& meshes, const RevealParams& params, const Control& control) {
@@ -39,6 +63,14 @@ RenderParams look_of(const RevealParams& params) {
     RenderParams look = params.render;
     if (params.plan.style == HoleStyle::paper) look.shading = Shading::flat;
     return look;
+}
+
+Frame render_plain(const MeshBvhs& meshes, const Bvh& whole, const View& view, const RevealParams& params,
+                   const Control& control) {
+    const RenderParams look = look_of(params);
+    if (params.wire.wire != Wire::none)
+        return render_wireframe(meshes, all_parts(meshes.scene()), view, params.wire, look.background, control);
+    return render(whole, nullptr, view, look, nullptr, nullptr, control);
 }
 
 Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Control& control) {
@@ -62,32 +94,47 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
 
     Revealed revealed;
     revealed.plan = plan_view(subject, view, params.plan, control);
-    if (params.plan.style != HoleStyle::paper) plan_caps(subject, revealed.plan, params.plan.solidity, control);
+    ViewPlan& plan = revealed.plan;
+    if (params.plan.style != HoleStyle::paper && !plan.ghost) plan_caps(subject, plan, params.plan.solidity, control);
     const double planned = seconds_since(start);
     report_progress("plan", 1);
 
-    // The plain picture first; the hole is drawn over it, so nothing changes outside.
     const RenderParams look = look_of(params);
-    Bvh opened = build_bvh(meshes, all_parts(scene), revealed.plan.cut.role, revealed.plan.cut.level);
-    const Caps caps = trace_caps(opened, revealed.plan.cut, revealed.plan.solids, revealed.plan.target_ids.id, control,
-                                  &revealed.plan.rays.caps);
-    add_caps(opened, caps.mesh);
+    const std::vector<PartId> all = all_parts(scene);
+    const std::vector<std::uint8_t> rest = rest_of(scene, params, plan);
+    // What becomes a thin shell is taken out of the scene, so that light gets in, and laid over.
+    std::vector<PartId> shell = plan.ghost ? plan.cut_set : std::vector<PartId>{};
+    if (params.rest == Rest::ghost)
+        std::copy_if(all.begin(), all.end(), std::back_inserter(shell), [&](PartId id) { return rest[index(id)]; });
+    Bvh opened = build_bvh(meshes, all, plan.cut.role, plan.cut.level);
+    const Bvh targets = build_bvh(meshes, plan.opened);
     Frame plain;
-    if (!revealed.plan.nothing_revealed()) {
-        plain = render_around(subject.whole, view, look, revealed.plan.cut, control);
-        if (revealed.plan.nothing_to_cut()) {
-            revealed.frame = plain;
-        } else {
-            const Bvh targets = build_bvh(meshes, revealed.plan.opened);
-            revealed.frame = render(opened, &targets, view, look, &revealed.plan.cut, &plain, control, &caps);
-        }
-    } else {
+    Caps caps;
+    if (plan.nothing_revealed() || !shell.empty())
         plain.ids = trace_ids(subject.whole, view, view.window(), control, &plain.rays.primary);
+    if (!plan.nothing_revealed()) {
+        std::optional<Bvh> solid, solid_opened;
+        if (!shell.empty()) {
+            std::sort(shell.begin(), shell.end());
+            std::vector<PartId> left;
+            std::set_difference(all.begin(), all.end(), shell.begin(), shell.end(), std::back_inserter(left));
+            solid.emplace(build_bvh(meshes, left));
+            solid_opened.emplace(build_bvh(meshes, left, plan.cut.role, plan.cut.level));
+        }
+        const Bvh& around = solid ? *solid : subject.whole;
+        Bvh& inside = solid_opened ? *solid_opened : opened;
+        caps = trace_caps(inside, plan.cut, plan.solids, plan.target_ids.id, control, &plan.rays.caps);
+        add_caps(inside, caps.mesh);
+        revealed.frame = draw(plan, around, inside, targets, caps, look, solid ? nullptr : &plain, control);
+        const bool cut = !plan.ghost && !plan.nothing_to_cut();
+        const Drawn drawn{cut ? inside : around, &targets, cut ? &plan.cut : nullptr,
+                          cut ? &caps : nullptr, view,     look};
+        restyle(revealed.frame, drawn, rest, params.rest, control);
+        if (!shell.empty()) lay_shell(revealed.frame, drawn, build_bvh(meshes, shell), control);
     }
     const double rendered = seconds_since(start) - planned;
 
-    revealed.report = measure(subject, revealed.plan, opened, plain,
-                              revealed.plan.nothing_revealed() ? plain : revealed.frame, control);
+    revealed.report = measure(subject, plan, opened, plain, plan.nothing_revealed() ? plain : revealed.frame, control);
     set_options(revealed.report, scene, params);
     revealed.report.options.view = view;
     revealed.report.camera = is_auto(params.camera)         ? "auto"

@@ -18,6 +18,11 @@ struct Revealed {
 /// How both pictures, with and without the hole, are drawn when `params` are asked for.
 [[nodiscard]] RenderParams look_of(const RevealParams& params);
 
+/// The plain picture, or the wireframe, that `params` ask for: no hole.
+/// @param whole  every part. @throws Error as render() and render_wireframe().
+[[nodiscard]] Frame render_plain(const MeshBvhs& meshes, const Bvh& whole, const View& view, const RevealParams& params,
+                                 const Control& control = {});
+
 /// Opens a hole around the targets in whatever hides them and draws the picture.
 ///
 /// @param meshes  from build_mesh_bvhs; the scene behind it must hold at least one part.

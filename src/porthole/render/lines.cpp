@@ -304,7 +304,7 @@ private:
     }
 
     void lay(const LinePoint& a, const LinePoint& b, LineInk& ink) const {
-        Ink& to = a.shy || b.shy ? ink.shy : ink.open;
+        Ink& to = rules_.shy || a.shy || b.shy ? ink.shy : ink.open;
         const Stroke stroke{a.at, b.at, rules_.half_width, a.darkness, b.darkness};
         if (rules_.dash_px > 0)
             to.add_dashed(stroke, rules_.dash_px);

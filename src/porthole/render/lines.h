@@ -38,6 +38,7 @@ struct LineRules {
     float crease = 0;        ///< two faces that meet at an edge
     float cap = 0;           ///< where a cut surface ends or bends
     float cap_part = 0;      ///< cut surfaces of two parts
+    bool shy = false;        ///< none of them may cover targets; else only those at caps
     float dash_px = 0;       ///< length of dashes; 0: solid
     /// Whether a line between two samples is wanted, the nearer one first; empty: all are.
     std::function<bool(const LineSample& nearer, const LineSample& farther)> wanted;

@@ -41,56 +41,12 @@ LineRules line_rules(const View& view, bool all, bool caps) {
     return rules;
 }
 
-bool may_open(const Picture& picture, const Cut* cut, int x, int y) {
-    if (picture.buffer.pixels.contains(x, y)) return picture.buffer.pixels(x, y).has(Pixel::may_open);
+bool may_open(const Cut* cut, int x, int y) {
     if (!cut) return false;
     for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx)
             if (cut->distance.at_or(x + dx, y + dy, 1.0f) <= 0) return true;
     return false;
-}
-
-/// Rays of the picture's own camera.
-LineTrace camera_trace(const Picture& picture, const Stage& stage, RayCounts& rays) {
-    return [&picture, &stage, &rays](const Samples16& asked, LineSample* out) {
-        Samples16 samples = asked;
-        for (int i = 0; i < kLanes; ++i)
-            samples.may_open[i] = samples.active[i] && may_open(picture, stage.cut, int(std::floor(samples.x[i])),
-                                                                int(std::floor(samples.y[i])));
-        const Seen16 seen = picture.camera.trace(samples, rays);
-        for (int i = 0; i < kLanes; ++i) {
-            if (!samples.active[i]) continue;
-            LineSample& s = out[i];
-            s = {};
-            s.in_hole = seen.in_hole[i];
-            s.on_target = seen.on_target[i];
-            const Hit& hit = seen.hit[i];
-            if (!hit.any()) continue;
-            const SurfacePoint point = picture.camera.surface(stage.placements, hit, samples.x[i], samples.y[i],
-                                                              seen.depth[i], seen.direction[i]);
-            s.part = hit.part;
-            s.cap = hit.cap;
-            s.depth = seen.depth[i];
-            s.position = point.position;
-            s.normal = point.normal;
-            s.flat_normal = point.flat_normal;
-        }
-    };
-}
-
-/// Which sub-positions of a pixel see a target; bit by sub-position.
-std::uint32_t on_target(const LineTrace& trace, int x, int y) {
-    Samples16 samples;
-    for (int i = 0; i < kLanes; ++i) {
-        const Vec2f p = Ink::position(x, y, i);
-        samples.x[i] = p.x, samples.y[i] = p.y;
-        samples.active[i] = true;
-    }
-    std::array<LineSample, kLanes> seen;
-    trace(samples, seen.data());
-    std::uint32_t bits = 0;
-    for (std::uint32_t i = 0; i < kLanes; ++i) bits |= seen[i].on_target ? 1u << i : 0u;
-    return bits;
 }
 
 bool near_target(const GBuffer& buffer, int x, int y) {
@@ -102,6 +58,49 @@ bool near_target(const GBuffer& buffer, int x, int y) {
 }
 
 } // namespace
+
+Seen16 look(const Camera& camera, Samples16 samples, RayCounts& rays) {
+    for (int i = 0; i < kLanes; ++i)
+        samples.may_open[i] =
+            samples.active[i] && may_open(camera.cut(), int(std::floor(samples.x[i])), int(std::floor(samples.y[i])));
+    return camera.trace(samples, rays);
+}
+
+LineTrace camera_trace(const Camera& camera, const std::vector<Placement>& placements, RayCounts& rays) {
+    return [&](const Samples16& samples, LineSample* out) {
+        const Seen16 seen = look(camera, samples, rays);
+        for (int i = 0; i < kLanes; ++i) {
+            if (!samples.active[i]) continue;
+            LineSample& s = out[i];
+            s = {};
+            s.in_hole = seen.in_hole[i];
+            s.on_target = seen.on_target[i];
+            const Hit& hit = seen.hit[i];
+            if (!hit.any()) continue;
+            const SurfacePoint point =
+                camera.surface(placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
+            s.part = hit.part;
+            s.cap = hit.cap;
+            s.depth = seen.depth[i];
+            s.position = point.position;
+            s.normal = point.normal;
+            s.flat_normal = point.flat_normal;
+        }
+    };
+}
+
+std::uint32_t parts_on_target(const Camera& camera, int x, int y, RayCounts& rays) {
+    Samples16 samples;
+    for (int i = 0; i < kLanes; ++i) {
+        const Vec2f p = Ink::position(x, y, i);
+        samples.x[i] = p.x, samples.y[i] = p.y;
+        samples.active[i] = true;
+    }
+    const Seen16 seen = look(camera, samples, rays);
+    std::uint32_t bits = 0;
+    for (std::uint32_t i = 0; i < kLanes; ++i) bits |= seen.on_target[i] ? 1u << i : 0u;
+    return bits;
+}
 
 float line_scale(const View& view) { return std::max(1.0f, float(view.height) / 1080.0f); }
 float line_half_width(const View& view) { return kHalfWidth * line_scale(view); }
@@ -149,11 +148,10 @@ void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect t
     const bool all = picture.params.lines == Lines::all;
     const bool caps = stage.cut && picture.params.shading != Shading::flat && picture.params.rim_px > 0;
     RayCounts rays;
-    const LineTrace trace = camera_trace(picture, stage, rays);
+    const LineTrace trace = camera_trace(picture.camera, stage.placements, rays);
     const auto inside = [&](int x, int y) {
         const bool known = picture.buffer.pixels.contains(x, y);
-        return known ? picture.buffer.pixels(x, y).has(Pixel::traced)
-                     : !stage.cut || may_open(picture, stage.cut, x, y);
+        return known ? picture.buffer.pixels(x, y).has(Pixel::traced) : !stage.cut || may_open(stage.cut, x, y);
     };
     LineInk ink(tile);
     if (all || caps) find_lines(picture.view, tile, inside, trace, line_rules(picture.view, all, caps), ink);
@@ -169,7 +167,8 @@ void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect t
                 open = std::max(open, ink.open.part(x, y, i));
             }
             if (shy == 0 && open == 0) continue;
-            const std::uint32_t targets = shy > 0 && near_target(picture.buffer, x, y) ? on_target(trace, x, y) : 0;
+            const std::uint32_t targets =
+                shy > 0 && near_target(picture.buffer, x, y) ? parts_on_target(picture.camera, x, y, rays) : 0;
             float sum = 0;
             for (int i = 0; i < Ink::kParts; ++i)
                 sum += std::max(ink.open.part(x, y, i), (targets >> i & 1u) ? 0.0f : hidden[std::size_t(i)]);

@@ -11,6 +11,15 @@ namespace porthole {
 /// How much wider than stated lines are in pictures over 1080 px high.
 [[nodiscard]] float line_scale(const View& view);
 
+/// What samples anywhere in the picture see: Camera::trace() with `may_open` as the cut has it.
+[[nodiscard]] Seen16 look(const Camera& camera, Samples16 samples, RayCounts& rays);
+
+/// The rays of a camera. Keeps references.
+[[nodiscard]] LineTrace camera_trace(const Camera& camera, const std::vector<Placement>& placements, RayCounts& rays);
+
+/// Which sub-positions of a pixel (Ink::position) see a target; bit by sub-position.
+[[nodiscard]] std::uint32_t parts_on_target(const Camera& camera, int x, int y, RayCounts& rays);
+
 /// Where along the rim of a hole its line is drawn: where something was cut away.
 ///
 /// On bumpy surfaces the cut begins ragged: here the surface lies in front of it, there behind.

@@ -65,7 +65,9 @@ Seen16 Camera::trace(const Samples16& samples, RayCounts& rays) const {
     for (int i = 0; i < kLanes; ++i) {
         if (!plain[i]) continue;
         ++rays.primary;
-        if (packet.hit(i)) store_hit(packet, i, packet.tfar[i] * depth_per_t[i], seen);
+        if (!packet.hit(i)) continue;
+        store_hit(packet, i, packet.tfar[i] * depth_per_t[i], seen);
+        seen.on_target[i] = !cut_ && targets_ && targets_->holds(packet.part(i));
     }
     return seen;
 }

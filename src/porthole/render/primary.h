@@ -20,13 +20,14 @@ struct Seen16 {
     Vec3f direction[kLanes];
     float depth[kLanes];    ///< metres along camera -z; +infinity if nothing is hit
     bool in_hole[kLanes];   ///< the sample lies in the hole: its rays obey the cut
-    bool on_target[kLanes]; ///< in the hole, and an opened target is what it sees
+    bool on_target[kLanes]; ///< what it sees is an opened target, with a cut: in the hole
 };
 
 /// Traces camera rays of one view. Holds references; const use is thread-safe.
 class Camera {
 public:
-    /// @param targets, cut  both null for a plain picture.
+    /// @param targets  opened ones; null: none.
+    /// @param cut      null for a plain picture.
     /// @param caps          of the cut; may be null.
     Camera(const Bvh& bvh, const Bvh* targets, const View& view, const Cut* cut, const Caps* caps = nullptr);
 

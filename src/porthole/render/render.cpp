@@ -65,7 +65,7 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     passes.run(0.5, [&](Rect tile) { gather_tile(picture, occlusion, placements, tile); });
 
     std::vector<Tint> tints;
-    if (cut) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
+    if (targets) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
     const Stage stage{scene, bvh, cut, params, lighting, occlusion, placements, tints};
     passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
     if (params.samples > 1) {
@@ -79,12 +79,12 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     passes.run(0.05, [&](Rect tile) { draw_lines(picture, stage, rim, tile); });
 }
 
-Frame draw_plain(const Bvh& bvh, const View& view, const RenderParams& params, const Cut* covering,
+Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* covering,
                  const Control& control) {
-    const Camera camera(bvh, nullptr, view, nullptr);
+    const Camera camera(bvh, targets, view, nullptr);
     Picture picture(view, params, camera, view.window());
     mark_everything(picture, covering);
-    draw(picture, bvh, nullptr, nullptr, nullptr, control);
+    draw(picture, bvh, targets, nullptr, nullptr, control);
     return {std::move(picture.color), std::move(picture.buffer.ids), {}, picture.rays.get()};
 }
 
@@ -134,13 +134,13 @@ Frame render(const Bvh& bvh, const Bvh* targets, const View& view, const RenderP
     assert(!cut == !under);
     return drawn(view, params, [&] {
         return cut ? draw_hole(bvh, targets, view, params, *cut, *under, caps, control)
-                   : draw_plain(bvh, view, params, nullptr, control);
+                   : draw_plain(bvh, targets, view, params, nullptr, control);
     });
 }
 
 Frame render_around(const Bvh& bvh, const View& view, const RenderParams& params, const Cut& cut,
                     const Control& control) {
-    return drawn(view, params, [&] { return draw_plain(bvh, view, params, &cut, control); });
+    return drawn(view, params, [&] { return draw_plain(bvh, nullptr, view, params, &cut, control); });
 }
 
 } // namespace porthole

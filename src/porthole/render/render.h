@@ -75,8 +75,9 @@ struct Frame {
 /// outside the hole *is* the plain picture.
 ///
 /// @param bvh      every part, built with the roles of `cut` when there is one.
-/// @param targets  hierarchy of the opened targets only; used with a cut: each sample inside
-///                 or at the rim of the hole asks it first. May be null without a cut.
+/// @param targets  hierarchy of the opened targets only. With a cut each sample inside or at
+///                 the rim of the hole asks it first; without one its parts are emphasised
+///                 wherever they are seen. May be null without a cut.
 /// @param cut      may be null.
 /// @param caps     of the cut, from trace_caps(); null or empty: nothing is capped. Its mesh has
 ///                 been added to `bvh` if shadows and mirrors are to see it.

@@ -241,9 +241,10 @@ struct Edges {
 class Wireframe {
 public:
     Wireframe(const MeshBvhs& meshes, std::span<const PartId> parts, const View& view, const WireParams& params,
-              const Control& control)
+              Vec3f background, const Control& control)
         : meshes_(meshes), bvh_(build_bvh(meshes, parts)), scene_(meshes.scene()), view_(view), params_(params),
-          control_(control), half_width_(0.5f * kFeatureWidth * params.width_px * line_scale(view)),
+          background_(background), control_(control),
+          half_width_(0.5f * kFeatureWidth * params.width_px * line_scale(view)),
           margin_(int(std::ceil(half_width_)) + 2), nearest_(float(1e-6 * scene_bounds(scene_).diagonal())) {}
 
     Frame draw() {
@@ -385,7 +386,7 @@ private:
         if (!primitives_.empty()) draw_primitives(tile, ink);
         if (params_.hidden == HiddenLines::dashed)
             for (const Primitive& primitive : primitives_) draw_hidden(primitive, tile, ink);
-        const Vec3f b = params_.background;
+        const Vec3f b = background_;
         const float light = 0.2126f * b.x + 0.7152f * b.y + 0.0722f * b.z < 0.18f ? 0.9f : 0.02f;
         for (int y = tile.y0; y < tile.y1; ++y)
             for (int x = tile.x0; x < tile.x1; ++x) {
@@ -449,6 +450,7 @@ private:
     const Scene& scene_;
     const View& view_;
     const WireParams& params_;
+    Vec3f background_;
     const Control& control_;
     float half_width_;
     int margin_;
@@ -464,11 +466,11 @@ private:
 } // namespace
 
 Frame render_wireframe(const MeshBvhs& meshes, std::span<const PartId> parts, const View& view,
-                       const WireParams& params, const Control& control) {
+                       const WireParams& params, Vec3f background, const Control& control) {
     if (!(params.width_px > 0) || !(params.width_px <= 100))
         throw Error(ErrorKind::usage, "E0140", "width_px", "outside 0..100");
     try {
-        return Wireframe(meshes, parts, view, params, control).draw();
+        return Wireframe(meshes, parts, view, params, background, control).draw();
     } catch (const std::bad_alloc&) {
         throw Error(ErrorKind::limit, "E0902", "render",
                     "memory ran out for a wireframe of " + std::to_string(view.width) + " x " +
