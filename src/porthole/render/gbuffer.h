@@ -43,7 +43,6 @@ struct Pixel {
         on_target = 4,  ///< and sees an opened target
         may_open = 8,   ///< some sample of the pixel may be in the hole
         rim = 16,       ///< the rim may pass through the pixel: every sample is needed
-        on_rim = 32,    ///< its sample lies on the line along the rim
         cap = 64,       ///< and sees the cut through solid material
         open_back = 128 ///< or the back of a cut part that has no caps
     };

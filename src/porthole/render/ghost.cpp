@@ -13,13 +13,17 @@ constexpr int kTile = 64;
 constexpr float kClear = 0.10f, kDense = 0.62f; ///< of the veil, facing the eye and at grazing angles
 constexpr float kPower = 2.2f;                  ///< how late it gets dense
 constexpr Vec3f kPale{0.50f, 0.53f, 0.57f};     ///< what its colours tend to
-constexpr float kPaleShare = 0.5f;
-constexpr float kStep = 0.06f; ///< of the veil's density between pixels, from which on one sample is not enough
+constexpr float kPaleShare = 0.35f;
+constexpr float kStep = 0.06f;    ///< of the veil's density between pixels, from which on one sample is not enough
+constexpr int kLayers = 2;        ///< parts behind each other that are drawn
+constexpr int kMostSurfaces = 12; ///< of one part that a ray passes to find the next
+constexpr float kBehind = 0.55f;  ///< how much of the second layer is drawn
 constexpr float kOutlineDark = 0.6f, kStepDark = 0.45f, kCreaseDark = 0.35f;
 
 /// The shell as one sample sees it.
 struct Veil {
     PartId part = kNoPart; ///< none: not seen
+    PartId behind = kNoPart;
     float depth = kInfinity;
     bool on_target = false;
     Vec4f color; ///< premultiplied
@@ -49,35 +53,76 @@ public:
     [[nodiscard]] std::int64_t primary() const { return primary_; }
 
 private:
+    /// The first surface of a part along a ray.
+    struct ShellHit {
+        Hit hit;
+        Vec3f direction;
+        float depth = kInfinity;
+    };
+    /// By part that the ray meets, then by lane.
+    using ShellHits = std::array<std::array<ShellHit, kLanes>, kLayers>;
+
+    /// What rays meet of the shell, part behind part, before `nearer_than`.
+    [[nodiscard]] ShellHits find_layers(const Samples16& samples, const float (&nearer_than)[kLanes],
+                                        RayCounts& rays) const {
+        ShellHits hits;
+        RayHit16 packet;
+        float tnear[kLanes] = {}, depth_per_t[kLanes];
+        PartId last[kLanes];
+        bool open[kLanes];
+        for (int i = 0; i < kLanes; ++i) {
+            open[i] = samples.active[i];
+            last[i] = kNoPart;
+        }
+        int found[kLanes] = {};
+        for (int step = 0; step < kMostSurfaces; ++step) {
+            bool any = false;
+            for (int i = 0; i < kLanes; ++i) {
+                packet.clear(i);
+                if (!open[i]) continue;
+                const Ray ray = view_.ray(samples.x[i], samples.y[i]);
+                depth_per_t[i] = ray.depth_per_t;
+                packet.set(i, ray.origin, ray.direction, tnear[i], kInfinity);
+                any = true;
+                ++rays.primary;
+            }
+            if (!any) break;
+            intersect(shell_, packet, Coherence::coherent);
+            for (int i = 0; i < kLanes; ++i) {
+                if (!open[i]) continue;
+                const float depth = packet.tfar[i] * depth_per_t[i];
+                open[i] = packet.hit(i) && depth < nearer_than[i] - tolerance_;
+                if (!open[i]) continue;
+                tnear[i] = packet.tfar[i] * (1 + 4e-6f) + placements_[index(packet.part(i))].offset;
+                if (packet.part(i) == last[i]) continue;
+                last[i] = packet.part(i);
+                hits[std::size_t(found[i])][std::size_t(i)] = {
+                    {packet.part(i), packet.triangle[i], packet.u[i], packet.v[i]}, packet.direction(i), depth};
+                open[i] = ++found[i] < kLayers;
+            }
+        }
+        return hits;
+    }
+
     void look(const Samples16& samples, Veil* out, RayCounts& rays) const {
         const Seen16 solid = porthole::look(solids_, samples, rays);
-        RayHit16 packet;
-        for (int i = 0; i < kLanes; ++i) {
-            packet.clear(i);
+        const ShellHits hits = find_layers(samples, solid.depth, rays);
+        for (std::size_t i = 0; i < kLanes; ++i) {
             if (!samples.active[i]) continue;
-            out[i] = {};
-            out[i].on_target = solid.on_target[i];
-            packet.set(i, solid.origin[i], solid.direction[i], 0, kInfinity);
-            ++rays.primary;
-        }
-        intersect(shell_, packet, Coherence::coherent);
-        for (int i = 0; i < kLanes; ++i) {
-            if (!samples.active[i] || !packet.hit(i)) continue;
-            const float depth = packet.tfar[i] * view_.ray(samples.x[i], samples.y[i]).depth_per_t;
-            if (!(depth < solid.depth[i] - tolerance_)) continue;
+            const ShellHit &first = hits[0][i], &second = hits[1][i];
             Veil& v = out[i];
-            v.part = packet.part(i);
-            v.depth = depth;
-            if (!v.on_target) v.color = veil_color(packet, i);
+            v = {first.hit.part, second.hit.part, first.depth, solid.on_target[i], {}};
+            if (v.on_target || !first.hit.any()) continue;
+            v.color = veil_color(first);
+            if (second.hit.any()) v.color = v.color + veil_color(second) * (kBehind * (1.0f - v.color.w));
         }
     }
 
-    [[nodiscard]] Vec4f veil_color(const RayHit16& packet, int i) const {
-        const Hit hit{packet.part(i), packet.triangle[i], packet.u[i], packet.v[i]};
-        const Placement& placement = placements_[index(hit.part)];
-        const SurfacePoint point = surface_point(placement, hit, packet.direction(i));
-        const Substance s = substance(scene_, placement, hit);
-        const float facing = clamp01(-dot(point.normal, packet.direction(i)));
+    [[nodiscard]] Vec4f veil_color(const ShellHit& seen) const {
+        const Placement& placement = placements_[index(seen.hit.part)];
+        const SurfacePoint point = surface_point(placement, seen.hit, seen.direction);
+        const Substance s = substance(scene_, placement, seen.hit);
+        const float facing = clamp01(-dot(point.normal, seen.direction));
         const float density = kClear + (kDense - kClear) * std::pow(1.0f - facing, kPower);
         // Lit from the upper left, so that the shell has a form of its own.
         const Affine3f& camera = view_.world_from_camera;
@@ -107,7 +152,8 @@ private:
     }
 
     [[nodiscard]] static bool differ(const Veil& a, const Veil& b) {
-        return a.part != b.part || a.on_target != b.on_target || std::abs(a.color.w - b.color.w) > kStep;
+        return a.part != b.part || a.behind != b.behind || a.on_target != b.on_target ||
+               std::abs(a.color.w - b.color.w) > kStep;
     }
 
     void lay_pixel(const Image<Veil>& veil, int x, int y, RayCounts& rays) {
@@ -136,28 +182,45 @@ private:
         if (color.w > 0) frame_.color(x, y) = color + frame_.color(x, y) * (1.0f - color.w);
     }
 
+    void trace_lines(std::size_t layer, const Samples16& samples, LineSample* out, RayCounts& rays) const {
+        const Seen16 solid = porthole::look(solids_, samples, rays);
+        float everywhere[kLanes];
+        for (float& depth : everywhere) depth = kInfinity;
+        const ShellHits hits = find_layers(samples, everywhere, rays);
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            if (!samples.active[i]) continue;
+            LineSample& s = out[i];
+            s = {};
+            const ShellHit& seen = hits[layer][i];
+            if (!seen.hit.any()) continue;
+            // What is solid has edges of its own.
+            s.masked = !(seen.depth < solid.depth[i] - tolerance_);
+            if (s.masked) continue;
+            const SurfacePoint point = surface_point(placements_[index(seen.hit.part)], seen.hit, seen.direction);
+            s.part = seen.hit.part;
+            s.depth = seen.depth;
+            s.position = point.position;
+            s.normal = point.normal;
+            s.flat_normal = point.flat_normal;
+        }
+    }
+
     void lay_lines(Rect tile, const Image<Veil>& veil, RayCounts& rays) {
-        const LineTrace alone = plain_trace(shell_, view_, placements_, rays);
-        const LineTrace trace = [&](const Samples16& samples, LineSample* out) {
-            alone(samples, out);
-            const Seen16 solid = porthole::look(solids_, samples, rays);
-            for (int i = 0; i < kLanes; ++i)
-                if (samples.active[i] && solid.hit[i].any() && !(out[i].depth < solid.depth[i] - tolerance_)) {
-                    // Nothing of the shell, or behind what is solid: that has its own edges.
-                    const bool behind = out[i].part != kNoPart;
-                    out[i] = {};
-                    out[i].masked = behind;
-                }
-        };
-        LineRules rules;
-        rules.half_width = line_half_width(view_);
-        rules.outline = kOutlineDark;
-        rules.part = rules.step = kStepDark;
-        rules.crease = kCreaseDark;
-        rules.shy = true;
         LineInk ink(tile);
-        find_lines(
-            view_, tile, [](int, int) { return true; }, trace, rules, ink);
+        for (std::size_t layer = 0; layer < kLayers; ++layer) {
+            const LineTrace trace = [&](const Samples16& samples, LineSample* out) {
+                trace_lines(layer, samples, out, rays);
+            };
+            const float strength = layer == 0 ? 1.0f : kBehind;
+            LineRules rules;
+            rules.half_width = line_half_width(view_);
+            rules.outline = kOutlineDark * strength;
+            rules.part = rules.step = kStepDark * strength;
+            rules.crease = kCreaseDark * strength;
+            rules.shy = true;
+            find_lines(
+                view_, tile, [](int, int) { return true; }, trace, rules, ink);
+        }
         for (int y = tile.y0; y < tile.y1; ++y)
             for (int x = tile.x0; x < tile.x1; ++x) {
                 float darkness = ink.shy.darkness(x, y);

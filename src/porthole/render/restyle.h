@@ -34,12 +34,12 @@ void restyle(Frame& frame, const Drawn& drawn, const std::vector<std::uint8_t>& 
 
 /// Lays the parts of `shell` over a picture of everything else, thin: a veil in their own pale
 /// colour that is clear where they face the eye and dense where they turn away, and their
-/// outlines, steps and creases (none with Lines::none). Only the first surface along a ray is
-/// drawn, and only in front of what `frame` shows there. Pixels that show a target are left as
-/// they are; what the shell alone covers gets its ids.
+/// outlines, steps and creases (none with Lines::none). Along a ray the first surface of the
+/// first part is drawn, that of the second one weaker, both only in front of what `frame` shows. Pixels that show a
+/// target are left as they are; what the shell alone covers gets its ids.
 /// @param frame  the picture without those parts, as `drawn`.
 /// @throws Error limit E0902; Cancelled. The same bits for any number of threads.
-/// Cost: two rays a pixel, samples at the shell's edges.
+/// Cost: some four rays a pixel, samples at the shell's edges.
 void lay_shell(Frame& frame, const Drawn& drawn, const Bvh& shell, const Control& control = {});
 
 } // namespace porthole
