@@ -73,6 +73,14 @@ Image<Rgba8> drawn_widths(const ViewPlan& plan) {
     return out;
 }
 
+/// Caps yellow, backs of parts without caps red.
+Image<Rgba8> drawn_inside(const Mask& inside) {
+    return drawn(inside, [](std::uint8_t v) {
+        if (v == Frame::cap) return Rgba8{240, 200, 60, 255};
+        return v == Frame::open_back ? Rgba8{220, 60, 50, 255} : Rgba8{30, 30, 30, 255};
+    });
+}
+
 } // namespace
 
 std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* before, const Frame* after) {
@@ -100,6 +108,7 @@ std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* befo
         add("12-cut-depth-" + std::to_string(level), drawn_depth(depth));
     }
     add("13-loose-depth", drawn_depth(plan.cut.loose_depth));
+    if (after) add("16-inside", drawn_inside(after->inside));
     if (after) add("14-parts-after", drawn_ids(after->ids.id));
     if (after) add("15-depth-after", drawn_depth(after->ids.depth));
     return pictures;

@@ -160,6 +160,22 @@ std::optional<double> wall_visible(const Subject& subject, const ViewPlan& plan,
                  std::int64_t(covered.size()));
 }
 
+CapReport report_caps(const Scene& scene, const ViewPlan& plan, const Frame& after) {
+    CapReport r;
+    const auto path = [&](PartId id) { return scene.parts[index(id)].path; };
+    for (const PartId id : plan.cut_set) {
+        if (plan.cut.cap_of(id) == CapRule::solid) r.solids.push_back(path(id));
+        if (plan.cut.cap_of(id) == CapRule::shell) r.shells.push_back(path(id));
+    }
+    for (const PartId id : plan.caps.open) r.open.push_back(path(id));
+    for (const PartId id : plan.caps.partly_open) r.partly_open.push_back(path(id));
+    for (const PartId id : plan.caps.around_eye) r.around_eye.push_back(path(id));
+    const std::vector<std::uint8_t>& inside = after.inside.pixels();
+    r.cap_pixels = std::count(inside.begin(), inside.end(), std::uint8_t(Frame::cap));
+    r.open_back_pixels = std::count(inside.begin(), inside.end(), std::uint8_t(Frame::open_back));
+    return r;
+}
+
 PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, const Frame& before, const Frame& after,
                               const Control& control) {
     PictureReport r;
@@ -209,6 +225,7 @@ Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, con
                                            scene.parts[index(target.part)].path +
                                            "'; targets never cut each other: ask for one of them"});
     }
+    report.caps = report_caps(scene, plan, after);
     for (const PartId id : plan.cut_set) report.cut_parts.push_back(scene.parts[index(id)].path);
     report.picture = measure_picture(subject, plan, before, after, control);
     report.plan_rays = plan.rays;

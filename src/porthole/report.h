@@ -56,6 +56,17 @@ struct TargetReport {
     PixelRuns mask;      ///< those where it is the nearest of the opened targets
 };
 
+/// How the parts that were cut are drawn inside: paths.
+struct CapReport {
+    std::vector<std::string> solids;      ///< capped wherever they are cut
+    std::vector<std::string> shells;      ///< hold a target: capped on the chamfer only
+    std::vector<std::string> open;        ///< no closed piece: no cap, seen from both sides
+    std::vector<std::string> partly_open; ///< solids or shells with open pieces beside the closed ones
+    std::vector<std::string> around_eye;  ///< no cap: the eye lies in them
+    std::int64_t cap_pixels = 0;          ///< pixel centres that see a cap
+    std::int64_t open_back_pixels = 0;    ///< those that see the back of a part without caps
+};
+
 struct PictureReport {
     std::optional<double> outline_iou, context_removed, wall_visible;
     std::int64_t see_through_px = 0;     ///< model before, nothing after
@@ -85,6 +96,7 @@ struct Report {
     bool nothing_to_cut = false;
     std::vector<TargetReport> targets;
     std::vector<std::string> cut_parts; ///< paths of the parts that were cut
+    CapReport caps;
     PictureReport picture;
     ViewPlan::Rays plan_rays;
     RayCounts frame_rays;

@@ -177,6 +177,14 @@ std::string to_json(const Report& report) {
              {"mask", json_of(t.mask)}});
     j["targets"] = targets;
     j["cut_parts"] = report.cut_parts;
+    const CapReport& caps = report.caps;
+    j["caps"] = {{"solids", caps.solids},
+                 {"shells", caps.shells},
+                 {"open", caps.open},
+                 {"partly_open", caps.partly_open},
+                 {"around_eye", caps.around_eye},
+                 {"cap_pixels", caps.cap_pixels},
+                 {"open_back_pixels", caps.open_back_pixels}};
     const PictureReport& p = report.picture;
     j["picture"] = {{"outline_iou", json_of(p.outline_iou)},
                     {"see_through_px", p.see_through_px},

@@ -214,18 +214,19 @@ Hole grow_hole(std::span<const Contour> contours, const IdBuffer& targets, const
 
 std::vector<PartId> targets_without_room(const Hole& hole) {
     struct Count {
-        std::size_t covered = 0, narrow = 0;
+        std::size_t all = 0, covered = 0, narrow = 0;
     };
     std::map<PartId, Count> counts;
     for (const BandPixel& c : hole.band) {
-        if (!c.covered) continue;
         Count& count = counts[c.target];
+        ++count.all;
+        if (!c.covered) continue;
         ++count.covered;
         count.narrow += c.width_px < 1;
     }
     std::vector<PartId> refused;
     for (const auto& [target, count] : counts)
-        if (2 * count.narrow > count.covered) refused.push_back(target);
+        if (2 * count.narrow > count.covered && 4 * count.covered > count.all) refused.push_back(target);
     return refused;
 }
 
