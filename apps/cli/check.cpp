@@ -134,8 +134,8 @@ int run_check(const CheckOptions& options, Output& out, const Control& control) 
     std::string summary =
         with_commas(checked.target_pixels) + " target pixels, " + with_commas(checked.hole_pixels) + " of the hole";
     if (params.picture)
-        summary += ", picture: " + with_commas(checked.inside_pixels) + " pixels at the hole, " +
-                   with_commas(checked.outside_pixels) + " beside it";
+        summary += "; of the picture " + with_commas(checked.inside_pixels) + " against the reveal, " +
+                   with_commas(checked.outside_pixels) + " against the plain picture";
     else
         summary += ", no picture";
     if (checked.tied_pixels > 0) summary += "; " + with_commas(checked.tied_pixels) + " where surfaces tie";

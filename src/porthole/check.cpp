@@ -202,14 +202,15 @@ void compare_picture(const CheckParams& params, const View& view, const Mask& ho
                                  std::to_string(file.width()) + 'x' + std::to_string(file.height()) + " in the file");
     const Mask touched = grown_by_one(hole, view.window());
     const Image<Rgba16> inside = params.as_in_file(opened);
-    const Image<Rgba16> outside = params.lossy || restyled ? inside : params.as_in_file(plain);
+    const bool has_plain = !params.lossy && !restyled;
+    const Image<Rgba16> outside = has_plain ? params.as_in_file(plain) : inside;
     for (int y = 0; y < view.height; ++y)
         for (int x = 0; x < view.width; ++x) {
             bool in = touched(x, y) != 0;
-            if (!in && targets && !params.lossy && file(x, y) != outside(x, y) && file(x, y) == inside(x, y))
+            if (!in && targets && has_plain && file(x, y) != outside(x, y) && file(x, y) == inside(x, y))
                 in = holds_target(*targets, view, x, y);
             const Rgba16 found = in ? inside(x, y) : outside(x, y);
-            ++(in ? checked.inside_pixels : checked.outside_pixels);
+            ++(in || !has_plain ? checked.inside_pixels : checked.outside_pixels);
             if (file(x, y) != found)
                 comparison.differ(in ? "picture inside" : "picture outside", pixel_text(x, y),
                                   color_text(file(x, y)) + " in the file", color_text(found));
@@ -243,18 +244,19 @@ void compare_dense(const Report& reported, const ViewPlan& plan, const DenseView
     const Mask& hole = plan.hole.mask;
     checked.hole_pixels = std::count(hole.pixels().begin(), hole.pixels().end(), std::uint8_t(1));
     comparison.mask("hole", reported.picture.mask, hole, plan.whole, nullptr, "");
+    // Thin shells hide the background as the whole parts do.
+    const bool shells = plan.ghost || reported.options.rest == Rest::ghost;
+    const Mask& after = shells ? dense.before : dense.after;
     std::int64_t in_picture = 0, see_through = 0;
     const Rect picture = plan.view.window();
     for (int y = picture.y0; y < picture.y1; ++y)
         for (int x = picture.x0; x < picture.x1; ++x) {
             in_picture += hole.at_or(x, y, 0);
-            see_through += dense.before(x, y) && !dense.after(x, y);
+            see_through += dense.before(x, y) && !after(x, y);
         }
     comparison.figure("/picture/hole_pixels", plan.cut.empty() ? 0 : in_picture);
-    // Thin shells hide the background as the whole parts do.
-    if (plan.ghost || reported.options.rest == Rest::ghost) return;
     comparison.figure("/picture/see_through_px", see_through);
-    comparison.figure("/picture/outline_iou", dense_outline_iou(dense.before, dense.after));
+    comparison.figure("/picture/outline_iou", dense_outline_iou(dense.before, after));
 }
 
 /// @throws Error limit E0901.

@@ -38,7 +38,8 @@ struct Checked {
     std::int64_t target_pixels = 0;               ///< in picture and margin, found and compared
     std::int64_t hole_pixels = 0;                 ///< alike
     std::int64_t tied_pixels = 0;                 ///< where surfaces lie so that either answer is right
-    std::int64_t inside_pixels = 0;               ///< of the picture, compared with the reveal drawn again
+    std::int64_t inside_pixels = 0;               ///< of the picture, compared with the reveal drawn again: all, if the
+                                                  ///< rest of the model is restyled or the file is lossy
     std::int64_t outside_pixels = 0;              ///< compared with the plain picture
 
     [[nodiscard]] bool good() const { return differences.empty(); }

@@ -118,6 +118,30 @@ TEST(Check, TrueReportsPass) {
         }
 }
 
+TEST(Check, RestyledPicturesAreHeldAgainstTheReveal) {
+    const auto good = [](HoleStyle style, Rest rest, Lines lines) {
+        Builder b;
+        RevealParams params;
+        params.targets = {b.add_sphere("ball", {0.1, 0, 0}, 0.35)};
+        b.add_box("box", {0, 0, 0}, {1, 0.7, 0.8});
+        b.add_box("plate", {0, -0.8, 0}, {2, 0.1, 2});
+        params.view = look({2, 2, 4}, {}, 160, 120, 0.3f);
+        params.plan.style = style;
+        params.rest = rest;
+        params.render.lines = lines;
+        Finished run(std::move(b.scene), params);
+        const Checked checked = run.check();
+        EXPECT_TRUE(checked.good()) << said(checked);
+        run.picture(1, 1).r ^= 1;
+        EXPECT_TRUE(has(run.check(), "picture outside", "pixel 1,1"));
+        return checked;
+    };
+    for (const Rest rest : {Rest::dim, Rest::line, Rest::ghost})
+        EXPECT_EQ(good(HoleStyle::cutaway, rest, Lines::rim).outside_pixels, 0);
+    EXPECT_EQ(good(HoleStyle::ghost, Rest::keep, Lines::rim).outside_pixels, 0);
+    EXPECT_GT(good(HoleStyle::cutaway, Rest::keep, Lines::all).outside_pixels, 0);
+}
+
 TEST(Check, SaysTheSameWithAnyNumberOfThreads) {
     const Finished run = box_run();
     Json json = Json::parse(run.text);
