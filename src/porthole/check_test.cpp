@@ -506,6 +506,46 @@ TEST(ReadReport, NeverCrashesOnDamagedText) {
     EXPECT_GT(differ, 50);
 }
 
+TEST(ReadReport, ExtremeValuesAreRefusedOrDrawn) {
+    Builder b(8);
+    const PartId ball = b.add_sphere("ball", {}, 0.4);
+    b.add_box("box", {}, {1, 1, 1});
+    RevealParams params;
+    params.targets = {ball};
+    params.view = look({2, 2, 4}, {}, 24, 18, 0.3f);
+    const Finished run(std::move(b.scene), params);
+    const Json whole = Json::parse(run.text);
+    CheckParams limits;
+    limits.max_bytes = 64u << 20;
+    int numbers = 0, refused = 0;
+    const auto tried = [&](const std::string& pointer, const Json& value) {
+        Json json = whole;
+        json[Json::json_pointer(pointer)] = value;
+        const std::string text = json.dump();
+        try {
+            (void)check_report(*run.meshes, read_report(text, "test"), text, limits);
+        } catch (const Error&) {
+            ++refused;
+        }
+    };
+    for (const char* part : {"/camera", "/options"}) {
+        const Json flat = whole.at(Json::json_pointer(part)).flatten();
+        for (const auto& [below, value] : flat.items()) {
+            if (!value.is_number() && !value.is_null()) continue;
+            ++numbers;
+            const std::string pointer = part + below;
+            for (const double extreme : {0.0, -1.0, 0.5, 1e-30, -1e30, 1e30, 1e9, 3.4e38, -3.4e38}) {
+                tried(pointer, extreme);
+                if (value.is_null()) tried(pointer, {extreme, "px"});
+            }
+            for (const std::int64_t extreme : {std::int64_t(-2147483648), std::int64_t(2147483647)})
+                tried(pointer, extreme);
+        }
+    }
+    EXPECT_GT(numbers, 20);
+    EXPECT_GT(refused, numbers);
+}
+
 TEST(PixelRuns, GoThereAndBack) {
     std::mt19937 random(3);
     for (int i = 0; i < 200; ++i) {

@@ -155,12 +155,13 @@ View read_view(const Node& camera, const Node& size) {
     View view;
     view.orthographic = camera["orthographic"].boolean();
     view.world_from_camera = {camera["right"].vector(2), camera["up"].vector(2), -camera["forward"].vector(2),
-                              camera["position"].vector(1e30)};
+                              camera["position"].vector(1e15)};
     const Affine3f& a = view.world_from_camera;
     const float wrong = std::max({std::abs(dot(a.x, a.x) - 1), std::abs(dot(a.y, a.y) - 1), std::abs(dot(a.z, a.z) - 1),
                                   std::abs(dot(a.x, a.y)), std::abs(dot(a.y, a.z)), std::abs(dot(a.z, a.x))});
     if (!(wrong < 1e-3f)) camera.fail("right, up and forward are not unit vectors at right angles");
-    view.half_height = float(camera[view.orthographic ? "half_height" : "tan_half_fov_y"].number(1e-30, 1e30));
+    view.half_height = float(
+        camera[view.orthographic ? "half_height" : "tan_half_fov_y"].number(1e-12, view.orthographic ? 1e15 : 1e6));
     if (size.size() != 2) size.refuse("two numbers");
     view.width = std::int32_t(size.at(0).integer(1, kMaxSize));
     view.height = std::int32_t(size.at(1).integer(1, kMaxSize));
@@ -206,7 +207,7 @@ Report read_report(std::string_view text, const std::string& where) {
     const std::string up = model["up"].text();
     if (up != "y" && up != "z") model["up"].refuse("one of y, z");
     report.model.up = up[0];
-    report.model.metres_per_unit = model["metres_per_unit"].number(1e-300, 1e300);
+    report.model.metres_per_unit = model["metres_per_unit"].number(1e-9, 1e9);
 
     report.camera = root["camera"]["name"].text();
     report.view = read_view(root["camera"], root["size"]);

@@ -1,5 +1,6 @@
 """The command line on models made by hand: usage, errors, exit codes, files, interrupts."""
 
+import hashlib
 import json
 import os
 import signal
@@ -72,6 +73,17 @@ class Usage(Case):
 
 
 class Input(Case):
+    def test_models_and_cameras_as_far_as_stars(self):
+        for size in (1e11, 1e13, 5e17, 1e30):
+            lines = ["o box"] + harness.box((-size,) * 3, (size,) * 3, 1)
+            model = self.write("far.obj", "\n".join(lines) + "\n")
+            done = run("render", model, "-o", self.path("o.png"), *SMALL)
+            self.assertIn(done.returncode, (0, 3), done.stderr)
+            self.assertEqual("W" in done.stderr or done.returncode == 3, size > 1e12, done.stderr)
+        model = self.write("far.obj", "\n".join(["o box"] + harness.box((-1e9,) * 3, (1e9,) * 3, 1)) + "\n")
+        self.expect(run("render", model, "--units", "1e6", "-o", self.path("o.png")), 2, "E0122")
+        self.expect(run("render", self.model, "--camera-position", "0,1e20,0", "-o", self.path("o.png")), 2, "E0113")
+
     def test_missing_empty_folder(self):
         self.expect(run("render", self.path("absent.glb"), "-o", self.path("o.png")), 3, "E0201", "absent.glb")
         self.expect(run("render", self.write("empty.glb", b""), "-o", self.path("o.png")), 3, "error[E02")
@@ -172,7 +184,10 @@ class Reveal(Case):
         self.assertEqual((target["id"], target["path"]), (1, "inner"))
         self.assertEqual((target["visible_before"], target["visible_after"]), (0, 1))
         self.assertEqual(report["cut_parts"], ["outer"])
-        self.assertEqual(report["model"], {"path": self.model, "parts": 2, "triangles": 24})
+        whole = self.read("box.obj")
+        self.assertEqual(report["model"], {"path": self.model, "parts": 2, "triangles": 24, "bytes": len(whole),
+                                           "sha256": hashlib.sha256(whole).hexdigest(), "format": None, "time": -1,
+                                           "up": "y", "metres_per_unit": 1})
         self.assertGreater(report["run"]["peak_bytes"], 1 << 20)
         self.assertEqual(done.stdout, b"")
 

@@ -244,7 +244,7 @@ void report(Document& doc, std::span<const MeshRequest> requests, std::span<cons
         if (repairs[r].non_finite > bad_of_request[r])
             doc.warn("W0301", json, {},
                      text(repairs[r].non_finite - bad_of_request[r]) +
-                         " triangles were left out: vertices are not finite or beyond 1.8e18");
+                         " triangles were left out: vertices are not finite or beyond 1e12");
         if (repairs[r].degenerate == 0) continue;
         degenerate += repairs[r].degenerate;
         ++meshes;

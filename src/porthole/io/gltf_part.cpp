@@ -84,7 +84,7 @@ bool is_usable(const Affine3d& m, const Bounds3f& bounds) {
     if (!(x > 1e-30 && y > 1e-30 && z > 1e-30) || !(std::abs(m.determinant()) > 1e-10 * x * y * z)) return false;
     for (int corner = 0; corner < 8; ++corner) {
         const Vec3d p = m.point(Vec3d(bounds.corner(corner)));
-        if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1.8e18)) return false;
+        if (!(std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < double(kLargestCoordinate))) return false;
     }
     return true;
 }
@@ -212,7 +212,7 @@ void add_parts(Document& doc, std::span<const Node> nodes, const PlacedMeshes& p
         const Bounds3f& bounds = scene.meshes[std::size_t(mesh)].bounds;
         if (!is_usable(p.world_from_mesh, bounds.empty() ? Bounds3f{{0, 0, 0}, {0, 0, 0}} : bounds)) {
             doc.warn("W0305", *node.json, {},
-                     "the part is flat, or beyond 1.8e18, after its transforms; it is left out");
+                     "the part is flat, or beyond 1e12 m, after its transforms; it is left out");
             continue;
         }
         paths.push_back({path_of(doc, nodes, segments, p.node, path_bytes)});

@@ -235,6 +235,9 @@ void convert_units(Scene& scene, const LoadParams& params) {
         material.thickness *= float(s);
         material.attenuation_distance *= float(s);
     }
+    const Bounds3d box = scene_bounds(scene);
+    if (!box.empty() && !(box.diagonal() <= 2 * double(kLargestCoordinate)))
+        throw Error(ErrorKind::usage, "E0122", "--units", "with such units the model is more than 1e12 m large");
 }
 
 /// Parts of which no triangle was usable say nothing and would stretch the scene's box. If

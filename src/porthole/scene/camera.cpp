@@ -184,7 +184,9 @@ void check(const CameraParams& p, int width, int height) {
     const auto finite_vector = [](const std::optional<Vec3d>& v) { return !v || is_finite(*v); };
     const auto direction_like = [&](const std::optional<Vec3d>& v) { return !v || (is_finite(*v) && length(*v) > 0); };
     check_range(width >= 1 && height >= 1, "--size", "at least 1x1");
-    check_range(finite_vector(p.position), "--camera-position", "three finite numbers");
+    const bool near =
+        !p.position || (is_finite(*p.position) && length(*p.position) <= 1000 * double(kLargestCoordinate));
+    check_range(near, "--camera-position", "three numbers, at most 1e15 m away");
     check_range(finite_vector(p.focal_point), "--camera-focal-point", "three finite numbers");
     check_range(direction_like(p.view_up), "--camera-view-up", "three finite numbers, not all zero");
     check_range(direction_like(p.direction), "--camera-direction", "three finite numbers, not all zero");

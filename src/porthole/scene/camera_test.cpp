@@ -278,6 +278,7 @@ TEST(Camera, CamerasOfTheFile) {
     EXPECT_THAT(code_and_reason({.view_angle_deg = 180}), HasSubstr("E0113"));
     EXPECT_THAT(code_and_reason({.direction = Vec3d{0, 0, 0}}), HasSubstr("E0113"));
     EXPECT_THAT(code_and_reason({.position = Vec3d{NAN, 0, 0}}), HasSubstr("E0113"));
+    EXPECT_THAT(code_and_reason({.position = Vec3d{0, 1e16, 0}}), HasSubstr("E0113"));
 }
 
 TEST(Camera, CandidatesAreUnitAndSpread) {

@@ -41,9 +41,6 @@ std::uint64_t triangle_count(const Scene& scene) {
 
 namespace {
 
-// Embree's own limit: beyond it squares overflow inside the traversal.
-constexpr float kLargestCoordinate = 1.8e18f;
-
 bool usable(Vec3f p) {
     return std::abs(p.x) < kLargestCoordinate && std::abs(p.y) < kLargestCoordinate &&
            std::abs(p.z) < kLargestCoordinate;

@@ -139,6 +139,10 @@ struct Scene {
 [[nodiscard]] std::uint64_t triangle_count(
     const Scene& scene); ///< over parts: a shared mesh counts each time; primitives have none
 
+/// Coordinates beyond this, in metres or a mesh's own units, are not usable: from there, and
+/// from a camera that sees all of it, products of coordinates still fit into float.
+inline constexpr float kLargestCoordinate = 1e12f;
+
 /// Puts a freshly read mesh in order: drops triangles with a non-finite, out-of-range or
 /// repeated corner, and all triangles when none has any area, computes bounds, reserves Embree's padding, fixes the
 /// submeshes. Every reader calls it.
