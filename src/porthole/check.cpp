@@ -105,21 +105,25 @@ private:
         // Masks were compared pixel by pixel; a run and its warnings may differ.
         if (pointer == "/run" || pointer == "/warnings" || said_.contains(pointer)) return;
         if (pointer.ends_with("/mask") || pointer.ends_with("/alone")) return;
+        const auto below = [&](const std::string& key) {
+            std::string longer = pointer;
+            return longer.append("/").append(key);
+        };
         if (reported.is_object() && found.is_object()) {
             for (const auto& [key, value] : found.items()) {
+                const std::string place = below(key);
                 const auto other = reported.find(key);
                 if (other != reported.end())
-                    compare(*other, value, pointer + '/' + key);
-                else if (said_.insert(pointer + '/' + key).second)
-                    differ("figure", pointer + '/' + key, "nothing", shortened(value));
+                    compare(*other, value, place);
+                else if (said_.insert(place).second)
+                    differ("figure", place, "nothing", shortened(value));
             }
             for (const auto& [key, value] : reported.items())
-                if (!found.contains(key)) differ("figure", pointer + '/' + key, shortened(value), "nothing");
+                if (!found.contains(key)) differ("figure", below(key), shortened(value), "nothing");
             return;
         }
         if (reported.is_array() && found.is_array() && reported.size() == found.size()) {
-            for (std::size_t i = 0; i < found.size(); ++i)
-                compare(reported[i], found[i], pointer + '/' + std::to_string(i));
+            for (std::size_t i = 0; i < found.size(); ++i) compare(reported[i], found[i], below(std::to_string(i)));
             return;
         }
         if (reported != found) differ("figure", pointer, shortened(reported), shortened(found));
