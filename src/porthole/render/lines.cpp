@@ -77,7 +77,7 @@ public:
         : view_(view), trace_(trace), rules_(rules), tile_(tile), reach_(reach_of(rules)),
           coarse_(tile.grown(reach_ + 2)), fine_{2 * coarse_.x0, 2 * coarse_.y0, 2 * coarse_.x1 + 1,
                                                  2 * coarse_.y1 + 1},
-          slot_(fine_, kNotTraced), close_(tile.grown(reach_)) {}
+          slot_(fine_, kNotTraced), close_(tile.grown(reach_)), caps_only_(rules.caps_only()) {}
 
     void run(const std::function<bool(int, int)>& inside, LineInk& ink) {
         look_at_pixels(inside);
@@ -119,6 +119,10 @@ private:
     [[nodiscard]] bool known(int i, int j) const { return slot_(i, j) != kNotTraced; }
     [[nodiscard]] const LineSample& sample(int i, int j) const { return samples_[std::size_t(slot_(i, j))]; }
 
+    [[nodiscard]] bool may_be_line(const LineSample& a, const LineSample& b) const {
+        return (!caps_only_ || a.cap || b.cap) && suspect(view_, a, b);
+    }
+
     void look_at_pixels(const std::function<bool(int, int)>& inside) {
         Batch batch(*this);
         for (int y0 = coarse_.y0; y0 < coarse_.y1; y0 += 4)
@@ -136,7 +140,7 @@ private:
         const auto compare = [&](int x, int y, int dx, int dy) {
             const int i = 2 * x + 1, j = 2 * y + 1, k = i + 2 * dx, l = j + 2 * dy;
             if (x + dx >= r.x1 || y + dy >= r.y1 || !known(i, j) || !known(k, l)) return;
-            if (!suspect(view_, sample(i, j), sample(k, l))) return;
+            if (!may_be_line(sample(i, j), sample(k, l))) return;
             any = true;
             for (int v = y - 1; v <= y + dy + 1; ++v)
                 for (int u = x - 1; u <= x + dx + 1; ++u)
@@ -176,7 +180,7 @@ private:
             const int k = is_across ? i + 1 : i, l = is_across ? j : j + 1;
             if (!known(i, j) || !known(k, l)) return;
             const LineSample &a = sample(i, j), &b = sample(k, l);
-            if (!suspect(view_, a, b)) return;
+            if (!may_be_line(a, b)) return;
             // The rim has its own line, which is smoother than where rays happen to meet it.
             if (a.in_hole != b.in_hole && (a.part == b.part || !(a.on_target || b.on_target))) return;
             links.push_back(
@@ -322,6 +326,7 @@ private:
     Image<std::int32_t> slot_; ///< of a lattice point in samples_
     std::vector<LineSample> samples_;
     Mask close_;
+    bool caps_only_;
     Image<LinePoint> across_, down_; ///< on the link to the right and below
 };
 

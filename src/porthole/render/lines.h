@@ -40,6 +40,8 @@ struct LineRules {
     float cap_part = 0;      ///< cut surfaces of two parts
     bool shy = false;        ///< none of them may cover targets; else only those at caps
     float dash_px = 0;       ///< length of dashes; 0: solid
+    /// Whether only cut surfaces have lines: then nothing else is looked at closely.
+    [[nodiscard]] bool caps_only() const { return outline == 0 && part == 0 && step == 0 && crease == 0; }
     /// Whether a line between two samples is wanted, the nearer one first; empty: all are.
     std::function<bool(const LineSample& nearer, const LineSample& farther)> wanted;
 };

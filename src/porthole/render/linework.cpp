@@ -57,6 +57,17 @@ bool near_target(const GBuffer& buffer, int x, int y) {
     return false;
 }
 
+/// Pixels in and around a tile with a cap two pixels away or less.
+Mask pixels_near_caps(const Picture& picture, Rect tile, float half_width) {
+    constexpr int kNear = 2;
+    const Rect w = tile.grown(int(std::ceil(half_width)) + 8 + kNear);
+    Mask caps(w);
+    for (int y = w.y0; y < w.y1; ++y)
+        for (int x = w.x0; x < w.x1; ++x)
+            caps(x, y) = picture.buffer.pixels.contains(x, y) && picture.buffer.pixels(x, y).has(Pixel::cap);
+    return widened(caps, kNear);
+}
+
 } // namespace
 
 Seen16 look(const Camera& camera, Samples16 samples, RayCounts& rays) {
@@ -149,20 +160,33 @@ void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect t
     const bool caps = stage.cut && picture.params.shading != Shading::flat && picture.params.rim_px > 0;
     RayCounts rays;
     const LineTrace trace = camera_trace(picture.camera, stage.placements, rays);
+    const LineRules rules = line_rules(picture.view, all, caps);
+    const Mask near_caps = caps && rules.caps_only() ? pixels_near_caps(picture, tile, rules.half_width) : Mask();
+    // Around a hole the plain picture lacks the pixels that the hole will cover, but its lines must not.
     const auto inside = [&](int x, int y) {
+        if (!stage.cut) return true;
+        if (!near_caps.empty() && !near_caps.at_or(x, y, 0)) return false;
         const bool known = picture.buffer.pixels.contains(x, y);
-        return known ? picture.buffer.pixels(x, y).has(Pixel::traced) : !stage.cut || may_open(stage.cut, x, y);
+        return known ? picture.buffer.pixels(x, y).has(Pixel::traced) : may_open(stage.cut, x, y);
     };
+    bool any = false;
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x) any |= picture.buffer.pixels(x, y).has(Pixel::traced);
+    if (!any) return;
     LineInk ink(tile);
-    if (all || caps) find_lines(picture.view, tile, inside, trace, line_rules(picture.view, all, caps), ink);
+    const bool has_ink =
+        all || std::find(near_caps.pixels().begin(), near_caps.pixels().end(), 1) != near_caps.pixels().end();
+    if (has_ink) find_lines(picture.view, tile, inside, trace, rules, ink);
     for (int y = tile.y0; y < tile.y1; ++y)
         for (int x = tile.x0; x < tile.x1; ++x) {
             if (!picture.buffer.pixels(x, y).has(Pixel::traced) || (stage.cut && !picture.opened(x, y))) continue;
+            const bool on_rim = rim.reaches(x, y);
+            if (!on_rim && !has_ink) continue;
             float open = 0, shy = 0;
             std::array<float, Ink::kParts> hidden;
             for (int i = 0; i < Ink::kParts; ++i) {
                 const Vec2f p = Ink::position(x, y, i);
-                hidden[std::size_t(i)] = std::max(ink.shy.part(x, y, i), rim.darkness(p.x, p.y));
+                hidden[std::size_t(i)] = std::max(ink.shy.part(x, y, i), on_rim ? rim.darkness(p.x, p.y) : 0.0f);
                 shy = std::max(shy, hidden[std::size_t(i)]);
                 open = std::max(open, ink.open.part(x, y, i));
             }

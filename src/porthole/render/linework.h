@@ -34,8 +34,15 @@ public:
 
     /// How much the line takes of the light at a position of the picture, [0, 1].
     [[nodiscard]] float darkness(float x, float y) const;
+    /// False if darkness() is zero all over the pixel.
+    [[nodiscard]] bool reaches(int x, int y) const {
+        if (!cut_) return false;
+        const float d = cut_->distance.at_or(x, y, kNowhere);
+        return d < 3 && d > -2 * width_ - 3; // as distances differ by less than 1.5 a pixel
+    }
 
 private:
+    static constexpr float kNowhere = 1e6f;
     const Cut* cut_ = nullptr;
     float width_ = 0;
     Image<std::uint8_t> drawn_;
