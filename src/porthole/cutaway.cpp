@@ -40,7 +40,7 @@ Mask closed_targets(const Mask& targets, ViewPlan& plan) {
 
 Mask core_mask(const Mask& targets, HoleShape shape, ViewPlan& plan) {
     if (shape == HoleShape::silhouette) return targets;
-    const Mask closed = closed_targets(targets, plan);
+    Mask closed = closed_targets(targets, plan);
     if (shape == HoleShape::smooth) return closed;
     const Components groups = connected_components(closed);
     return shape == HoleShape::hull ? hull_mask(targets, groups) : box_mask(targets, groups);

@@ -131,14 +131,16 @@ template <typename Value> Image<double> sum_squares_twice(Rect read, int radius,
         row_sums.sum([&](std::int32_t i) { return value(read.x0 + i, y); }, once.data());
         row_sums.sum([&](std::int32_t i) { return once[std::size_t(i)]; }, sums.row(y));
     }
-    for (const auto& [from, to] : {std::pair{&sums, &lines}, std::pair{&lines, &sums}}) {
+    const auto add_lines = [&](const Image<double>* from, Image<double>* to) {
         const auto read_line = [&](std::int32_t line) { return static_cast<const double*>(from->row(read.y0 + line)); };
         const auto write_line = [&](std::int32_t line, const double* ends, const double* starts) {
             double* out = to->row(read.y0 + line);
             for (std::size_t x = 0; x < width; ++x) out[x] = ends[x] + starts[x];
         };
         sum_lines(runs, read.height(), read.y0, width, read_line, write_line);
-    }
+    };
+    add_lines(&sums, &lines);
+    add_lines(&lines, &sums);
     return sums;
 }
 

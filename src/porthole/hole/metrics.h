@@ -13,8 +13,8 @@ namespace porthole {
 
 /// For each covered contour pixel c inside the picture, the share of the pixels within
 /// `depth_px` of it, outside the targets and inside `opened`, where nothing cuttable nearer
-/// than the floor depth at c (the target's own, on a target) remains. Same order as hole.band; -1 for uncovered pixels and
-/// where there is no such pixel.
+/// than the floor depth at c (the target's own, on a target) remains. Same order as hole.band; -1 for uncovered pixels
+/// and where there is no such pixel.
 /// @param targets  ids and depths of the targets alone (the hole's window).
 /// @param opened   ids and depths of the opened scene at pixel centres (the picture).
 /// @param roles    by part id; fixed parts cannot be cut and do not count.

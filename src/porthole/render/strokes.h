@@ -28,7 +28,8 @@ public:
     /// Continuous position of sub-position `i` of pixel (x, y), row by row.
     [[nodiscard]] static Vec2f position(int x, int y, int i) {
         constexpr float kStep = 1.0f / float(kSide);
-        return {float(x) + (float(i % kSide) + 0.5f) * kStep, float(y) + (float(i / kSide) + 0.5f) * kStep};
+        const int row = i / kSide, column = i % kSide;
+        return {float(x) + (float(column) + 0.5f) * kStep, float(y) + (float(row) + 0.5f) * kStep};
     }
     /// Lays a stroke. Cost: sixteen distances for each pixel it comes near.
     void add(const Stroke& stroke);

@@ -136,8 +136,8 @@ std::vector<std::uint8_t> find_dead_patches(const Edges& edges, DisjointSets& pa
         for (std::size_t i = edges.odd[e].begin; i < edges.odd[e].end; ++i) {
             const std::uint32_t patch = patches.find(edges.half_edges[i].triangle());
             if (std::exchange(dead[patch], std::uint8_t(1))) continue;
-            const auto [first, last] = std::ranges::equal_range(touches, patch, {}, &Touch::patch);
-            for (auto t = first; t != last; ++t)
+            const auto first = std::ranges::lower_bound(touches, patch, {}, &Touch::patch);
+            for (auto t = first; t != touches.end() && t->patch == patch; ++t)
                 if (--living[t->edge][t->forward] == 0) waiting.push_back(t->edge);
         }
     }
