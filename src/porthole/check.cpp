@@ -6,6 +6,7 @@
 #include <set>
 
 #include "porthole/check_dense.h"
+#include "porthole/crumbs.h"
 
 namespace porthole {
 
@@ -290,6 +291,11 @@ void check_reveal(const MeshBvhs& meshes, const Report& reported, const CheckPar
                 const std::vector<PartId>& ids = plan.target_ids.id.pixels();
                 return std::find(ids.begin(), ids.end(), id) == ids.end();
             });
+        if (full.style != HoleStyle::paper && !plan.ghost) {
+            plan_caps(subject, plan, full.solidity, control);
+            const Bvh opened = build_bvh(meshes, all_parts(meshes.scene()), plan.cut.role, plan.cut.level);
+            (void)remove_crumbs(subject, plan, opened, build_bvh(meshes, plan.opened), control);
+        }
         const DenseView dense = look_densely(subject, plan, control);
         checked.rays = dense.rays, checked.crossings = dense.crossings, checked.tied_pixels = dense.tied_pixels;
         compare_dense(reported, plan, dense, comparison, checked);

@@ -91,6 +91,12 @@ struct TargetView {
     PartId hidden_by = kNoPart;      ///< another target that covers over half of its pixels
 };
 
+/// Slivers of cut parts that float in the hole, see crumbs.h.
+struct CrumbCount {
+    std::int64_t removed = 0, removed_px = 0;
+    std::int64_t kept = 0, kept_px = 0; ///< such as would open the model to the background
+};
+
 struct ViewPlan {
     View view;
     bool ghost = false; ///< the cut set is to be drawn as a thin shell; hole and cut only say where it hides
@@ -113,6 +119,7 @@ struct ViewPlan {
     Cut cut;                         ///< empty if nothing is to be cut
     std::vector<MeshSolid> solids;   ///< by mesh, judged for the cut set; empty before plan_caps()
     CapRules caps;                   ///< of the cut set; plan_caps()
+    CrumbCount crumbs;               ///< remove_crumbs()
 
     struct Rays {
         std::int64_t targets = 0, alone = 0, spans = 0, enclosing = 0, loose = 0;

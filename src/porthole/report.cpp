@@ -194,6 +194,7 @@ PictureReport measure_picture(const Subject& subject, const ViewPlan& plan, cons
     for (std::size_t i = 0; i < seen_before.size(); ++i)
         if (seen_before[i] && !seen_after[i]) r.parts_lost.push_back(subject.scene().parts[i].path);
 
+    r.crumbs = plan.crumbs;
     r.mask = encode_runs(plan.hole.mask);
     if (!plan.cut.empty()) {
         const Rect box = plan.hole.window.intersected(w.window());

@@ -72,6 +72,7 @@ struct PictureReport {
     std::int64_t see_through_px = 0;     ///< model before, nothing after
     std::int64_t hole_pixels = 0;        ///< targets and band, inside the picture
     std::vector<std::string> parts_lost; ///< seen before, nowhere after
+    CrumbCount crumbs;
     PixelRuns mask;                      ///< the hole, in the picture and its margin
     std::string file;                    ///< relative to the report's folder; empty: none, or standard output
     std::string sha256;                  ///< of the file; empty: no picture was written

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 
+#include "porthole/crumbs.h"
 #include "porthole/viewpoint.h"
 
 namespace porthole {
@@ -95,7 +96,8 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
     Revealed revealed;
     revealed.plan = plan_view(subject, view, params.plan, control);
     ViewPlan& plan = revealed.plan;
-    if (params.plan.style != HoleStyle::paper && !plan.ghost) plan_caps(subject, plan, params.plan.solidity, control);
+    const bool has_caps = params.plan.style != HoleStyle::paper && !plan.ghost;
+    if (has_caps) plan_caps(subject, plan, params.plan.solidity, control);
     const double planned = seconds_since(start);
     report_progress("plan", 1);
 
@@ -123,7 +125,7 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
         }
         const Bvh& around = solid ? *solid : subject.whole;
         Bvh& inside = solid_opened ? *solid_opened : opened;
-        caps = trace_caps(inside, plan.cut, plan.solids, plan.target_ids.id, control, &plan.rays.caps);
+        if (has_caps) caps = remove_crumbs(subject, plan, opened, targets, control);
         add_caps(inside, caps.mesh);
         revealed.frame = draw(plan, around, inside, targets, caps, look, solid ? nullptr : &plain, control);
         const bool cut = !plan.ghost && !plan.nothing_to_cut();
