@@ -169,7 +169,8 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
                      "Parts that are neither targets, kept nor cut: as they are, paler, lines alone, or a thin shell "
                      "(default keep)");
     app.option_defaults()->group("Hole");
-    add_read(app, "--depth", "Width of the band that the hole adds around targets (default 5% of the picture's height)",
+    add_read(app, "--depth",
+             "Width of the band that the hole adds around targets (default 5% of the picture's height, thin lines 3%)",
              "N[px|%|mm]",
              [&o](const std::string& text, const std::string& option) { o.plan.depth = parse_length(text, option); });
     add_choice<HoleStyle>(

@@ -16,6 +16,9 @@ namespace {
 constexpr double kClosing = 0.12;       ///< radius of the closing, of the picture's height
 constexpr double kMostAdded = 2;        ///< pixels that the closing may add, times the targets' own
 constexpr float kClearBands = 3;        ///< parts nearer than this to the floor beside targets are not cut for it
+constexpr double kLineBand = 0.03;      ///< band around thin targets, of the picture's height
+constexpr double kLineWidthPx = 3;      ///< thin: narrower than this on average
+constexpr double kLineLength = 0.1;     ///< and longer than this, of the picture's height
 constexpr float kLeastChamfer = 0.011f; ///< of the picture's height
 constexpr float kLeastChamferPx = 5;
 constexpr float kSmoothing = 0.6f; ///< radius of the maps' smoothing, of the band
@@ -44,6 +47,14 @@ Mask core_mask(const Mask& targets, HoleShape shape, ViewPlan& plan) {
     if (shape == HoleShape::smooth) return closed;
     const Components groups = connected_components(closed);
     return shape == HoleShape::hull ? hull_mask(targets, groups) : box_mask(targets, groups);
+}
+
+/// Whether the targets are lines rather than areas or dots: a wide window around them would show
+/// more of everything else than of them. A line w pixels wide has two contour pixels per w of its own.
+bool are_lines(const ViewPlan& plan) {
+    const double border = double(contour_pixels(plan.contours).size());
+    const double pixels = double(count(mask_of(plan.target_ids.id)));
+    return 2 * pixels < kLineWidthPx * border && border > 2 * kLineLength * plan.view.height;
 }
 
 /// Takes out of `core` what is not within the enclosing object and `clear_px` away from its
@@ -105,7 +116,7 @@ CutawayMargins cutaway_margins(const View& view, const PlanParams& params, const
     return {hole, hole + (params.shape == HoleShape::silhouette ? 0 : 2 * closing_radius_px(view))};
 }
 
-void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& band, Rect whole,
+void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect whole,
                   const IdBuffer& ids, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const float tolerance = subject.tolerance();
@@ -113,6 +124,9 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
     // What hides the targets, and what stands before the rest of the window that they make.
     plan.spans = trace_spans(subject.whole, kMaskCutSet, view, plan.target_ids, tolerance, control, &plan.rays.spans);
     if (plan.spans.parts.empty()) return;
+    HoleParams band = most;
+    if (!params.depth && are_lines(plan)) band.depth_px = std::max(1, int(std::lround(kLineBand * view.height)));
+    plan.depth_px = band.depth_px;
     Mask core = cropped(core_mask(mask_of(ids.id), params.shape, plan), plan.window);
     plan.core = fill_core(plan.target_ids, core);
     const int floor_blur = int(std::lround(band.blur_px));

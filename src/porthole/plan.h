@@ -47,7 +47,7 @@ struct Length {
 struct PlanParams {
     ContourMethod contours = ContourMethod::exact;
     HoleStyle style = HoleStyle::cutaway;
-    std::optional<Length> depth; ///< width of the band; unset: 5 % (cutaway, hole), 4 px (paper)
+    std::optional<Length> depth; ///< width of the band; unset: 5 % (cutaway: thin lines 3 %), 4 px (paper)
     Tight tight = Tight::refuse;
     CapOverrides solidity; ///< parts that the user says are solids or shells
 
@@ -101,7 +101,7 @@ struct ViewPlan {
     View view;
     bool ghost = false; ///< the cut set is to be drawn as a thin shell; hole and cut only say where it hides
                         ///< the targets
-    int depth_px = 0;   ///< width of the band asked for
+    int depth_px = 0;   ///< width of the band asked for, or chosen
     Rect whole;         ///< picture and margin
     Rect window;        ///< the part of picture and margin that the hole can touch; all images below
     std::vector<TargetView> targets; ///< in the order of Subject::targets

@@ -51,8 +51,10 @@ struct CutawayMargins {
 /// The rest of a plan of style cutaway once the targets are known: cut set, core, hole, cut.
 /// @param ids    the opened targets in the window that the closing needs, which holds plan.window;
 ///               plan.target_ids, contours and spans are made.
+/// @param most   with the widest band; around targets that are thin lines it is 3 % of the picture's
+///               height, unless the user asked for a width.
 /// @param whole  picture and margin of the hole.
-void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& band, Rect whole,
+void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect whole,
                   const IdBuffer& ids, ViewPlan& plan, const Control& control);
 
 } // namespace porthole

@@ -230,5 +230,47 @@ TEST(Plan, ExactEqualsFullAndThreadsDoNotMatter) {
     }
 }
 
+/// Half a turn of a wire around the view's axis behind a large plate.
+ViewPlan plan_arc(double radius, double half_width, const PlanParams& params = {}) {
+    Builder b;
+    std::vector<PartId> beads;
+    const int n = int(8 * radius / half_width);
+    for (int i = 0; i <= n; ++i) {
+        const double a = double(kPi) * i / n;
+        beads.push_back(b.add_box("bead" + std::to_string(i), {radius * std::cos(a), radius * std::sin(a), 0},
+                                  {half_width, half_width, half_width}));
+    }
+    b.add_box("plate", {0, 0, 1}, {5, 5, 0.1});
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    return plan_view(make_subject(meshes, beads), look({0, 0, 10}, {}, 300, 300, 1.5f, true), params);
+}
+
+TEST(Cutaway, ThinLinesGetANarrowBandUnlessOneIsAskedFor) {
+    EXPECT_EQ(plan_arc(0.8, 0.006).depth_px, 9);  // some 1.5 px wide, 3 % of 300
+    EXPECT_EQ(plan_arc(0.8, 0.04).depth_px, 15);  // 8 px wide
+    EXPECT_EQ(plan_arc(0.05, 0.01).depth_px, 15); // a dot
+    EXPECT_EQ(plan_arc(0.8, 0.006, {.depth = Length{}}).depth_px, 15);
+    EXPECT_EQ(plan_arc(0.8, 0.006, {.style = HoleStyle::hole}).depth_px, 15);
+    const ViewPlan plan = plan_arc(0.8, 0.006);
+    float widest = 0;
+    for (const BandPixel& c : plan.hole.band) widest = std::max(widest, c.width_px);
+    EXPECT_EQ(widest, 9);
+}
+
+TEST(Cutaway, ClosingThatBlowsTargetsUpIsHalved) {
+    // A solid target keeps the radius; the arc's bay, 12 % of the height being 36 px, is narrower
+    // than twice that and would be filled.
+    const int wanted = 36;
+    EXPECT_EQ(plan_arc(0.3, 0.2).closing_px, wanted);
+    const ViewPlan thin = plan_arc(0.25, 0.01);
+    EXPECT_LT(thin.closing_px, wanted);
+    EXPECT_EQ(wanted % std::max(1, thin.closing_px), 0);
+    const auto count = [](const Image<PartId>& ids) {
+        return std::count_if(ids.pixels().begin(), ids.pixels().end(), [](PartId id) { return id != kNoPart; });
+    };
+    const std::int64_t own = count(thin.target_ids.id);
+    EXPECT_LE(count(thin.core.id) - own, 2 * own);
+}
+
 } // namespace
 } // namespace porthole
