@@ -279,7 +279,7 @@ private:
         parallel_for(of_mesh.size(), control_, [&](std::size_t i) {
             if (used[i]) of_mesh[i] = mesh_edges(scene_.meshes[i]);
         });
-        const bool all = params_.wire == Wire::mesh || (params_.wire == Wire::automatic &&
+        const bool all = params_.wire == Wire::mesh || (params_.wire != Wire::feature &&
                                                         params_.hidden == HiddenLines::none && edges_are_long(of_mesh));
         half_width_ = 0.5f * line_scale(view_) * (all ? 1.0f : kFeatureWidth) * params_.width_px;
         Edges edges;

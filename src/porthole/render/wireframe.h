@@ -6,7 +6,7 @@
 namespace porthole {
 
 enum class Wire : std::uint8_t {
-    none,      ///< no wireframe
+    none,      ///< no wireframe asked for; drawn as automatic
     automatic, ///< mesh where edges in the picture are 8 px long on average and hidden ones are left out, else feature
     mesh,      ///< every edge of every triangle
     feature    ///< outlines, creases, and edges that do not join two triangles; a quarter wider
