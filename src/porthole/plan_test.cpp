@@ -272,5 +272,111 @@ TEST(Cutaway, ClosingThatBlowsTargetsUpIsHalved) {
     EXPECT_LE(count(thin.core.id) - own, 2 * own);
 }
 
+TEST(Cutaway, ChamferInAPlateIsAsWideAsThePlateIsThick) {
+    Builder b;
+    const PartId target = b.add_box("target", {0, 0, 0}, {0.3, 0.3, 0.3});
+    b.add_box("plate", {0, 0, 2}, {1.1, 1.1, 0.05});
+    b.add_box("wall", {0, 0, -2}, {1.1, 1.1, 0.05});
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, std::array{target});
+    const View view = look({0, 0, 10}, {}, 240, 240, 1.2f, true); // 100 px to the metre
+    PlanParams params{.depth = Length{Length::Unit::pixel, 25}};
+    const auto profiles = [&](auto&& expect) {
+        const ViewPlan plan = plan_view(subject, view, params);
+        ASSERT_EQ(plan.cut.levels.size(), 1u);
+        for (const int x : {152, 158, 164, 170, 174}) { // right of the target, whose last column is 149
+            const float inside = -plan.cut.distance(x, 120);
+            EXPECT_NEAR(inside, 150 + 25 - (x + 0.5), 1);
+            const CutProfile& p = plan.cut.levels[0](x, 120);
+            EXPECT_NEAR(p.start, 0, 1e-3);
+            if (p.width > 0) {
+                EXPECT_NEAR(p.front, 10 - 2.05, 1e-3);
+            }
+            EXPECT_NEAR(p.floor, 10 - 0.3, 1e-3);
+            expect(p, inside);
+        }
+    };
+    profiles([](const CutProfile& p, float inside) {
+        EXPECT_NEAR(p.width, 11, 0.05); // 1.1 times 0.1 m
+        EXPECT_NEAR(p.slope * p.width, 0.11, 1e-3);
+        EXPECT_NEAR(p.depth(inside), inside < p.width ? 10 - 2.05 + 0.01 * inside : 10 - 0.3, 2e-3);
+    });
+    params.bevel = Length{Length::Unit::pixel, 6};
+    profiles([](const CutProfile& p, float) {
+        EXPECT_NEAR(p.width, 6, 1e-3);
+        EXPECT_NEAR(p.slope * p.width, 0.11, 1e-3);
+    });
+    params.bevel = Length{Length::Unit::pixel, 0};
+    profiles([](const CutProfile& p, float inside) {
+        EXPECT_EQ(p.width, 0);
+        EXPECT_NEAR(p.depth(inside), 10 - 0.3, 1e-3);
+    });
+    params.bevel.reset();
+    params.angle_deg = 30;
+    profiles([](const CutProfile& p, float) {
+        EXPECT_GT(p.width, 20);
+        EXPECT_NEAR(p.slope, 0.01 / std::tan(double(kPi) / 6), 1e-4);
+    });
+}
+
+TEST(Cutaway, ChamferInASphericalShellFollowsIt) {
+    Builder b(96);
+    const PartId target = b.add_sphere("target", {0, 0, 0}, 0.3);
+    b.add_sphere("inner", {0, 0, 0}, 0.92);
+    b.add_sphere("outer", {0, 0, 0}, 1);
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const View view = look({0, 0, 10}, {}, 300, 300, 1.2f, true); // 125 px to the metre
+    const ViewPlan plan = plan_view(make_subject(meshes, std::array{target}), view, {.steps = false});
+    ASSERT_EQ(plan.cut.levels.size(), 1u);
+    int pixels = 0;
+    for (int y = 80; y < 220; ++y)
+        for (int x = 80; x < 220; ++x) {
+            if (!plan.hole.mask(x, y) || plan.target_ids.id(x, y) != kNoPart) continue;
+            const double away2 = (std::pow(x + 0.5 - 150, 2) + std::pow(y + 0.5 - 150, 2)) / (125 * 125);
+            const double front = 10 - std::sqrt(1 - away2), next = 10 - std::sqrt(0.92 * 0.92 - away2);
+            const CutProfile& p = plan.cut.levels[0](x, y);
+            EXPECT_NEAR(p.front, front, 0.02);
+            EXPECT_NEAR(p.slope * p.width, 1.1 * (next - front), 0.01);
+            EXPECT_LE(p.width, 0.6 * 15 + 1e-3);
+            EXPECT_LE(p.depth(-plan.cut.distance(x, y)), p.floor);
+            ++pixels;
+        }
+    EXPECT_GT(pixels, 2000);
+}
+
+TEST(Cutaway, ShellsOpenOneStepAfterTheOther) {
+    Builder b(48);
+    const PartId target = b.add_sphere("target", {0, 0, 0}, 0.2);
+    const PartId brain = b.add_sphere("brain", {0, 0, 0}, 0.5);
+    const PartId skull = b.add_sphere("skull", {0, 0, 0}, 0.75);
+    const PartId skin = b.add_sphere("skin", {0, 0, 0}, 1);
+    const PartId tumour = b.add_sphere("tumour", {0, 0, 0.35}, 0.1); // in the brain, before the target
+    const MeshBvhs meshes = build_mesh_bvhs(b.scene);
+    const Subject subject = make_subject(meshes, std::array{target});
+    const View view = look({0, 0, 10}, {}, 300, 300, 1.2f, true);
+    PlanParams params{.depth = Length{Length::Unit::pixel, 30}};
+    const ViewPlan plan = plan_view(subject, view, params);
+    ASSERT_EQ(plan.cut.levels.size(), 3u);
+    EXPECT_EQ(plan.cut.level_of(skin), 0u);
+    EXPECT_EQ(plan.cut.level_of(skull), 1u);
+    EXPECT_EQ(plan.cut.level_of(brain), 2u);
+    EXPECT_EQ(plan.cut.level_of(tumour), 2u);
+    // Right of the target, which ends at 175: three steps of 10 px from the rim at 205 inward.
+    for (const int x : {178, 186, 190, 196, 202})
+        for (std::size_t k = 0; k < 3; ++k) {
+            const CutProfile& p = plan.cut.levels[k](x, 150);
+            const float inside = -plan.cut.distance(x, 150);
+            EXPECT_NEAR(p.start, 10.0 * double(k), 0.3);
+            EXPECT_EQ(p.depth(inside) > -kInfinity, inside >= p.start) << x << " level " << k;
+            EXPECT_LE(p.width, 6 + 0.2);
+        }
+    // On the target all of them are gone.
+    for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(plan.cut.levels[k](150, 150).depth(-plan.cut.distance(150, 150)), 10 - 0.2, 2e-3);
+
+    params.steps = false;
+    EXPECT_EQ(plan_view(subject, view, params).cut.levels.size(), 1u);
+}
+
 } // namespace
 } // namespace porthole
