@@ -21,7 +21,10 @@ constexpr int kCrowd = 3;
 constexpr float kFlushFrom = 22, kFlushTo = 34, kStepsFrom = 36, kStepsTo = 52;
 
 /// Pixels off the tile whose lines matter to it.
-int reach_of(const LineRules& rules) { return int(std::ceil(rules.half_width + 0.5f * float(kCrowd) + 0.7f)); }
+int reach_of(const LineRules& rules) {
+    return int(std::ceil(std::max(rules.half_width, rules.rim > 0 ? rules.rim_half_width : 0.0f) +
+                         0.5f * float(kCrowd) + 0.7f));
+}
 
 float fade(float from, float to, float v) {
     const float t = clamp01((v - from) / (to - from));
@@ -63,7 +66,7 @@ bool on_side_of(const View& view, const LineSample& m, const LineSample& a, cons
 
 struct LinePoint {
     Vec2f at;
-    float darkness = 0;
+    float darkness = 0, half_width = 0;
     bool shy = false;
     bool found = false;
     bool flush = false; ///< the surfaces on both sides meet
@@ -232,6 +235,7 @@ private:
         const bool a_first = a.depth <= b.depth;
         const LineSample &nearer = a_first ? a : b, &farther = a_first ? b : a;
         LinePoint c;
+        c.half_width = rules_.half_width;
         if (a.masked || b.masked) return c;
         if (rules_.wanted && !rules_.wanted(nearer, farther)) return c;
         const bool background = a.part == kNoPart || b.part == kNoPart;
@@ -250,6 +254,9 @@ private:
                               : a.part != b.part ? std::max(rules_.cap_part, rules_.cap * step)
                                                  : rules_.cap * std::max(step, crease);
             if (cap >= c.darkness) c.darkness = cap, c.shy = true;
+            const float outer = a.cap != b.cap ? std::max(a.outer, b.outer) * (1 - step) : 0.0f;
+            c.darkness = std::max(c.darkness, c.darkness + (rules_.rim - c.darkness) * outer);
+            c.half_width += (rules_.rim_half_width - c.half_width) * outer;
         }
         c.flush = step < 0.5f;
         c.found = c.darkness > 0;
@@ -309,7 +316,7 @@ private:
 
     void lay(const LinePoint& a, const LinePoint& b, LineInk& ink) const {
         Ink& to = rules_.shy || a.shy || b.shy ? ink.shy : ink.open;
-        const Stroke stroke{a.at, b.at, rules_.half_width, a.darkness, b.darkness};
+        const Stroke stroke{a.at, b.at, std::max(a.half_width, b.half_width), a.darkness, b.darkness};
         if (rules_.dash_px > 0)
             to.add_dashed(stroke, rules_.dash_px);
         else

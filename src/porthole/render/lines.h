@@ -17,6 +17,7 @@ struct LineSample {
     bool in_hole = false;
     bool on_target = false;
     bool masked = false; ///< sees what has no lines, nor borders with them
+    float outer = 0;     ///< how much the end of a cut surface at what is seen here is the rim, [0, 1]
     float depth = kInfinity;
     Vec3f position, normal, flat_normal; ///< as in SurfacePoint; unused where nothing is hit
 };
@@ -38,8 +39,10 @@ struct LineRules {
     float crease = 0;        ///< two faces that meet at an edge
     float cap = 0;           ///< where a cut surface ends or bends
     float cap_part = 0;      ///< cut surfaces of two parts
-    bool shy = false;        ///< none of them may cover targets; else only those at caps
-    float dash_px = 0;       ///< length of dashes; 0: solid
+    float rim = 0;           ///< where a cut surface ends at a surface that is whole
+    float rim_half_width = 0.75f;
+    bool shy = false;  ///< none of them may cover targets; else only those at caps
+    float dash_px = 0; ///< length of dashes; 0: solid
     /// Whether only cut surfaces have lines: then nothing else is looked at closely.
     [[nodiscard]] bool caps_only() const { return outline == 0 && part == 0 && step == 0 && crease == 0; }
     /// Whether a line between two samples is wanted, the nearer one first; empty: all are.

@@ -29,10 +29,11 @@ Mask widened(const Mask& mask, int reach) {
     return out;
 }
 
-LineRules line_rules(const View& view, bool all, bool caps) {
+LineRules line_rules(const View& view, float rim_px, bool all, bool caps) {
     LineRules rules;
     rules.half_width = line_half_width(view);
-    if (caps) rules.cap = kInnerDark, rules.cap_part = kMeetDark;
+    rules.rim_half_width = 0.5f * rim_px * line_scale(view);
+    if (caps) rules.cap = kInnerDark, rules.cap_part = kMeetDark, rules.rim = kRimDark;
     if (all) {
         rules.outline = kOutlineDark;
         rules.step = kStepDark;
@@ -117,7 +118,7 @@ float line_scale(const View& view) { return std::max(1.0f, float(view.height) / 
 float line_half_width(const View& view) { return kHalfWidth * line_scale(view); }
 
 RimLine::RimLine(const Picture& picture, const Cut& cut, const IdBuffer& plain, float tolerance)
-    : cut_(&cut), width_(picture.params.rim_px * line_scale(picture.view)) {
+    : cut_(&cut), plain_(&plain), width_(picture.params.rim_px * line_scale(picture.view)) {
     const Rect w = picture.buffer.window();
     const int reach = std::max(2, int(std::lround(kBridged * float(picture.view.height))));
     Mask removed(w), whole(w);
@@ -131,6 +132,18 @@ RimLine::RimLine(const Picture& picture, const Cut& cut, const IdBuffer& plain, 
     for (std::size_t i = 0; i < whole.pixels().size(); ++i) whole.pixels()[i] &= std::uint8_t(!drawn_.pixels()[i]);
     const Mask stays = widened(whole, reach);
     for (std::size_t i = 0; i < stays.pixels().size(); ++i) drawn_.pixels()[i] &= std::uint8_t(!stays.pixels()[i]);
+}
+
+float RimLine::outer(float x, float y, const LineSample& s) const {
+    if (!cut_ || s.cap || !s.in_hole || s.on_target || s.part == kNoPart) return 0;
+    const int px = int(std::floor(x)), py = int(std::floor(y));
+    if (plain_->id.at_or(px, py, kNoPart) != s.part) return 0;
+    // What the pixel's centre sees without the cut, and whether that is the same surface.
+    const Ray ray = cut_->view.ray(float(px) + 0.5f, float(py) + 0.5f);
+    const Vec3f before = ray.origin + ray.direction * (plain_->depth(px, py) / ray.depth_per_t);
+    if (std::abs(dot(before - s.position, s.flat_normal)) > 0.5f * cut_->view.pixel_size(s.depth)) return 0;
+    // At the outline its own line is drawn.
+    return clamp01(-cut_->distance_at(x, y) * 0.5f - 1.0f);
 }
 
 float RimLine::darkness(float x, float y) const {
@@ -159,9 +172,16 @@ void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect t
     const bool all = picture.params.lines == Lines::all;
     const bool caps = stage.cut && picture.params.shading != Shading::flat && picture.params.rim_px > 0;
     RayCounts rays;
-    const LineTrace trace = camera_trace(picture.camera, stage.placements, rays);
-    const LineRules rules = line_rules(picture.view, all, caps);
-    const Mask near_caps = caps && rules.caps_only() ? pixels_near_caps(picture, tile, rules.half_width) : Mask();
+    const LineTrace seen_by_camera = camera_trace(picture.camera, stage.placements, rays);
+    const LineTrace trace = [&](const Samples16& samples, LineSample* out) {
+        seen_by_camera(samples, out);
+        for (int i = 0; i < kLanes; ++i)
+            if (samples.active[i]) out[i].outer = rim.outer(samples.x[i], samples.y[i], out[i]);
+    };
+    const LineRules rules = line_rules(picture.view, picture.params.rim_px, all, caps);
+    const Mask near_caps = caps && rules.caps_only()
+                               ? pixels_near_caps(picture, tile, std::max(rules.half_width, rules.rim_half_width))
+                               : Mask();
     // Around a hole the plain picture lacks the pixels that the hole will cover, but its lines must not.
     const auto inside = [&](int x, int y) {
         if (!stage.cut) return true;

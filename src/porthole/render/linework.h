@@ -32,6 +32,9 @@ public:
     /// @param plain    the ids of the same view without the cut.
     RimLine(const Picture& picture, const Cut& cut, const IdBuffer& plain, float tolerance);
 
+    /// How much the end of a cut surface at `s`, seen at a position of the picture, is the rim: where
+    /// the surface lies deeper than the cut begins, that is where the hole ends, and not at its outline.
+    [[nodiscard]] float outer(float x, float y, const LineSample& s) const;
     /// How much the line takes of the light at a position of the picture, [0, 1].
     [[nodiscard]] float darkness(float x, float y) const;
     /// False if darkness() is zero all over the pixel.
@@ -44,6 +47,7 @@ public:
 private:
     static constexpr float kNowhere = 1e6f;
     const Cut* cut_ = nullptr;
+    const IdBuffer* plain_ = nullptr;
     float width_ = 0;
     Image<std::uint8_t> drawn_;
 };
