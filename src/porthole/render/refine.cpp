@@ -7,9 +7,11 @@ namespace porthole {
 namespace {
 
 constexpr float kBorrowNormal = 0.9f;
+constexpr float kBorrowStep = 1.5f; ///< pixels off the tangent plane
 
 /// Filtered light of a neighbouring pixel on the same surface, if there is one.
-std::optional<Reach> borrow_light(const GBuffer& buffer, std::uint32_t key, Vec3f normal, float sx, float sy) {
+std::optional<Reach> borrow_light(const GBuffer& buffer, const View& view, std::uint32_t key, const SurfacePoint& point,
+                                  float sx, float sy) {
     const int x = int(std::floor(sx)), y = int(std::floor(sy));
     // The sample's own pixel, then its neighbours, the side on which the sample lies first.
     const int hx = sx - float(x) < 0.5f ? -1 : 1, hy = sy - float(y) < 0.5f ? -1 : 1;
@@ -17,7 +19,12 @@ std::optional<Reach> borrow_light(const GBuffer& buffer, std::uint32_t key, Vec3
     for (const Vec2i d : order) {
         const int px = x + d.x, py = y + d.y;
         if (!buffer.pixels.contains(px, py) || buffer.key(px, py) != key) continue;
-        if (dot(unpack_normal(buffer.pixels(px, py).normal), normal) < kBorrowNormal) continue;
+        if (dot(unpack_normal(buffer.pixels(px, py).normal), point.normal) < kBorrowNormal) continue;
+        // The inside of a wall faces as its outside does.
+        const float depth = buffer.ids.depth(px, py);
+        const Ray ray = view.ray(float(px) + 0.5f, float(py) + 0.5f);
+        const Vec3f there = ray.origin + ray.direction * (depth / ray.depth_per_t);
+        if (std::abs(dot(there - point.position, point.flat_normal)) > kBorrowStep * view.pixel_size(depth)) continue;
         return buffer.light(px, py).reach();
     }
     return std::nullopt;
@@ -62,7 +69,7 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
         Reach reach;
         if (!flat) {
             const std::uint32_t key = GBuffer::key(hit.part, seen.in_hole[i], hit.cap);
-            if (const auto light = borrow_light(buffer, key, p.normal, samples.x[i], samples.y[i]))
+            if (const auto light = borrow_light(buffer, picture.view, key, p, samples.x[i], samples.y[i]))
                 reach = *light;
             else
                 reach = stage.occlusion.reach({p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern},
