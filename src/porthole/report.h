@@ -73,11 +73,11 @@ struct PictureReport {
     std::int64_t hole_pixels = 0;        ///< targets and band, inside the picture
     std::vector<std::string> parts_lost; ///< seen before, nowhere after
     CrumbCount crumbs;
-    PixelRuns mask;                      ///< the hole, in the picture and its margin
-    std::string file;                    ///< relative to the report's folder; empty: none, or standard output
-    std::string sha256;                  ///< of the file; empty: no picture was written
-    int bits = 8;                        ///< per channel
-    bool no_background = false;          ///< alpha in the file
+    PixelRuns mask;             ///< the hole, in the picture and its margin
+    std::string file;           ///< relative to the report's folder; empty: none, or standard output
+    std::string sha256;         ///< of the file; empty: no picture was written
+    int bits = 8;               ///< per channel
+    bool no_background = false; ///< alpha in the file
 };
 
 struct RunReport {
