@@ -62,8 +62,8 @@ private:
     /// By part that the ray meets, then by lane.
     using ShellHits = std::array<std::array<ShellHit, kLanes>, kLayers>;
 
-    /// What rays meet of the shell, part behind part, before `nearer_than`.
-    [[nodiscard]] ShellHits find_layers(const Samples16& samples, const float (&nearer_than)[kLanes],
+    /// What rays meet of the shell, up to `count` parts behind each other, before `nearer_than`.
+    [[nodiscard]] ShellHits find_layers(const Samples16& samples, const float (&nearer_than)[kLanes], int count,
                                         RayCounts& rays) const {
         ShellHits hits;
         RayHit16 packet;
@@ -98,7 +98,7 @@ private:
                 last[i] = packet.part(i);
                 hits[std::size_t(found[i])][std::size_t(i)] = {
                     {packet.part(i), packet.triangle[i], packet.u[i], packet.v[i]}, packet.direction(i), depth};
-                open[i] = ++found[i] < kLayers;
+                open[i] = ++found[i] < count;
             }
         }
         return hits;
@@ -106,7 +106,7 @@ private:
 
     void look(const Samples16& samples, Veil* out, RayCounts& rays) const {
         const Seen16 solid = porthole::look(solids_, samples, rays);
-        const ShellHits hits = find_layers(samples, solid.depth, rays);
+        const ShellHits hits = find_layers(samples, solid.depth, kLayers, rays);
         for (std::size_t i = 0; i < kLanes; ++i) {
             if (!samples.active[i]) continue;
             const ShellHit &first = hits[0][i], &second = hits[1][i];
@@ -186,7 +186,7 @@ private:
         const Seen16 solid = porthole::look(solids_, samples, rays);
         float everywhere[kLanes];
         for (float& depth : everywhere) depth = kInfinity;
-        const ShellHits hits = find_layers(samples, everywhere, rays);
+        const ShellHits hits = find_layers(samples, everywhere, int(layer) + 1, rays);
         for (std::size_t i = 0; i < kLanes; ++i) {
             if (!samples.active[i]) continue;
             LineSample& s = out[i];
