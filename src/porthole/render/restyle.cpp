@@ -13,7 +13,7 @@ namespace {
 constexpr int kTile = 64;
 constexpr float kSaturation = 0.55f, kTowardsPale = 0.25f;
 constexpr Vec3f kPale{0.72f, 0.72f, 0.74f};
-constexpr float kOutlineDark = 0.65f, kStepDark = 0.5f, kCreaseDark = 0.35f;
+constexpr float kOutlineDark = 0.8f, kStepDark = 0.65f, kCreaseDark = 0.45f;
 
 Vec4f dimmed(Vec4f c) {
     if (!(c.w > 0)) return c;
