@@ -192,7 +192,7 @@ TEST(Rest, KeptPartsStayAsTheyAre) {
     for (const Rest rest : {Rest::dim, Rest::line, Rest::ghost}) {
         n.params.rest = rest;
         const Revealed r = n.draw();
-        const PixelPoint p = n.params.view->project({-1.8f, 0.2f, -1.9f}),
+        const PixelPoint p = n.params.view->project({-1.4f, 0.2f, -1.9f}),
                          q = n.params.view->project({1.7f, -0.3f, 0.5f});
         EXPECT_EQ(r.frame.color(int(p.x), int(p.y)), kept.frame.color(int(p.x), int(p.y)));
         EXPECT_NE(r.frame.color(int(q.x), int(q.y)), kept.frame.color(int(q.x), int(q.y)));
