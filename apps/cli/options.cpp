@@ -56,11 +56,11 @@ Vec3f parse_color(const std::string& text, const std::string& option) {
     return {channel(16), channel(8), channel(0)};
 }
 
-Length parse_length(const std::string& text, const std::string& option) {
+Length parse_length(const std::string& text, const std::string& option, bool zero) {
     const std::string expected = "a length such as 54px, 5% (of the picture's height) or 3mm";
     std::string_view rest = text;
     const std::optional<double> value = take_number(rest);
-    if (!value || *value <= 0) refuse(option, text, expected);
+    if (!value || *value < 0 || (*value == 0 && !zero)) refuse(option, text, expected);
     if (rest.empty() || rest == "px") return {Length::Unit::pixel, *value};
     if (rest == "%") return {Length::Unit::percent, *value};
     if (rest == "mm") return {Length::Unit::millimetre, *value};

@@ -73,8 +73,9 @@ struct CheckOptions {
 [[nodiscard]] Vec2i parse_size(const std::string& text, const std::string& option); ///< "1920x1080", 1..32768 each
 [[nodiscard]] Vec3f parse_color(const std::string& text,
                                 const std::string& option); ///< "#rrggbb", white, black; linear
-[[nodiscard]] Length parse_length(const std::string& text, const std::string& option); ///< "54", "54px", "5%", "3mm"
-[[nodiscard]] double parse_units(const std::string& text, const std::string& option);  ///< "mm", "in", "0.01": metres
+[[nodiscard]] Length parse_length(const std::string& text, const std::string& option,
+                                  bool zero = false); ///< "54", "54px", "5%", "3mm"; above 0, or from 0
+[[nodiscard]] double parse_units(const std::string& text, const std::string& option); ///< "mm", "in", "0.01": metres
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& text, const std::string& option); ///< "512M", "4G"
 [[nodiscard]] Vec3d parse_vector(const std::string& text, const std::string& option);        ///< "1,2,3"
 [[nodiscard]] char parse_up(const std::string& text, const std::string& option);             ///< "y", "+Z"

@@ -1,8 +1,10 @@
 // Style cutaway: the countersunk porthole.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
+#include <string>
 
+#include "porthole/base/error.h"
 #include "porthole/hole/blur.h"
 #include "porthole/hole/distance.h"
 #include "porthole/hole/masks.h"
@@ -89,21 +91,45 @@ Cut uncut(const Subject& subject, const ViewPlan& plan) {
     return cut;
 }
 
-/// Takes back the cut where it would leave nothing to see: the last surface that was to go
-/// stays, so that no hole shows the background through the object.
-void keep_last_surface(const Subject& subject, const Bvh& cut_bvh, ViewPlan& plan, const Control& control) {
-    Mask where = plan.hole.mask;
-    for (std::size_t i = 0; i < where.pixels().size(); ++i)
-        if (plan.target_ids.id.pixels()[i] != kNoPart) where.pixels()[i] = 0;
+/// Loose parts go where the cut set does, but what lies on the last surface cut, as the floor on
+/// which a cut thing stood, stays whatever the rounding. And where the cut would leave nothing to
+/// see, its last surface stays: no hole shows the background through the object.
+void settle_last_surfaces(const Subject& subject, const Bvh& cut_bvh, ViewPlan& plan, const Control& control) {
     const CutEffect effect =
         trace_cut_effect(cut_bvh, subject.whole, plan.cut, plan.hole.mask, control, &plan.rays.loose);
     plan.cut.loose_depth = effect.farthest;
-    for (std::size_t i = 0; i < where.pixels().size(); ++i) {
-        if (!where.pixels()[i] || effect.left.pixels()[i]) continue;
-        const float last = effect.farthest.pixels()[i] * (1 - 1e-6f);
-        plan.cut.levels[effect.farthest_level.pixels()[i]].pixels()[i].floor = last;
-        plan.cut.loose_depth.pixels()[i] = last;
+    for (std::size_t i = 0; i < effect.left.pixels().size(); ++i) {
+        float& loose = plan.cut.loose_depth.pixels()[i];
+        if (loose == -kInfinity) continue;
+        const bool beside_targets = plan.target_ids.id.pixels()[i] == kNoPart;
+        if (beside_targets && !effect.left.pixels()[i]) {
+            loose -= 1e-6f * std::abs(loose);
+            plan.cut.levels[effect.farthest_level.pixels()[i]].pixels()[i].floor = loose;
+        } else {
+            loose -= std::max(subject.tolerance(), 8 * std::numeric_limits<float>::epsilon() * std::abs(loose));
+        }
     }
+}
+
+RimParams rim_params(const Subject& subject, const View& view, const PlanParams& params) {
+    RimParams rim;
+    rim.least_px = std::max(kLeastChamferPx, kLeastChamfer * float(view.height));
+    const auto refuse = [](const char* option, const std::string& reason) {
+        throw Error(ErrorKind::usage, "E0120", option, reason);
+    };
+    if (params.bevel) {
+        const double width = length_px(subject, view, *params.bevel);
+        if (!(width >= 0) || !(width <= 4096))
+            refuse("--bevel", "the chamfer would be " + std::to_string(width) + " px wide; 0 to 4096 px are possible");
+        rim.bevel_px = float(width);
+    }
+    if (params.angle_deg) {
+        const double angle = *params.angle_deg;
+        if (!(angle > 0) || !(angle < 90))
+            refuse("--angle", std::to_string(angle) + " is not between 0 and 90 degrees");
+        rim.angle = float(angle * double(kPi) / 180);
+    }
+    return rim;
 }
 
 } // namespace
@@ -120,6 +146,7 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
                   const IdBuffer& ids, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const float tolerance = subject.tolerance();
+    RimParams rim = rim_params(subject, view, params);
 
     // What hides the targets, and what stands before the rest of the window that they make.
     plan.spans = trace_spans(subject.whole, kMaskCutSet, view, plan.target_ids, tolerance, control, &plan.rays.spans);
@@ -127,6 +154,7 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
     HoleParams band = most;
     if (!params.depth && are_lines(plan)) band.depth_px = std::max(1, int(std::lround(kLineBand * view.height)));
     plan.depth_px = band.depth_px;
+    rim.blur_px = int(std::lround(kSmoothing * float(band.depth_px)));
     Mask core = cropped(core_mask(mask_of(ids.id), params.shape, plan), plan.window);
     plan.core = fill_core(plan.target_ids, core);
     const int floor_blur = int(std::lround(band.blur_px));
@@ -181,13 +209,8 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
         for (std::size_t i = 0; i < wall.next.pixels().size(); ++i)
             wall.next.pixels()[i] = std::min(wall.next.pixels()[i], hole.floor_depth.pixels()[i]);
     }
-    RimParams rim;
-    rim.blur_px = int(std::lround(kSmoothing * float(band.depth_px)));
-    rim.least_px = std::max(kLeastChamferPx, kLeastChamfer * float(view.height));
-    if (params.bevel) rim.bevel_px = float(length_px(subject, view, *params.bevel));
-    if (params.angle_deg) rim.angle = float(*params.angle_deg * double(kPi) / 180);
     plan.cut.levels = rim_levels(hole, plan.core.id, view, walls, rim);
-    keep_last_surface(subject, cut_bvh, plan, control);
+    settle_last_surfaces(subject, cut_bvh, plan, control);
 }
 
 } // namespace porthole
