@@ -101,6 +101,11 @@ std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* befo
         add("10-distance", drawn_distance(plan.hole.distance));
         add("11-floor-depth", drawn_depth(plan.hole.floor_depth));
     }
+    add("11-core-depth", drawn_depth(plan.core.depth));
+    for (std::size_t level = 0; level < plan.walls.size(); ++level) {
+        add("11-wall-front-" + std::to_string(level), drawn_depth(plan.walls[level].first));
+        add("11-wall-next-" + std::to_string(level), drawn_depth(plan.walls[level].next));
+    }
     for (std::size_t level = 0; level < plan.cut.levels.size(); ++level) {
         Image<float> depth(plan.window, kInfinity);
         for (std::size_t i = 0; i < depth.pixels().size(); ++i)

@@ -109,12 +109,14 @@ Vec3f best_direction(const Subject& subject, const FrameSubject& frame, const Ca
     const std::vector<Vec3f> directions = candidate_directions();
 
     // Scores of some candidates at a given width, side by side; each is planned by one thread.
-    const auto scores_at = [&](const std::vector<std::size_t>& candidates, int width_px) {
+    const auto scores_at = [&](const std::vector<std::size_t>& candidates, int width_px, HoleStyle style) {
         const double scale = std::min(1.0, double(width_px) / width);
         const int w = std::max(1, int(std::lround(width * scale))), h = std::max(1, int(std::lround(height * scale)));
         PlanParams small = params;
+        small.style = style;
         if (small.depth && small.depth->unit == Length::Unit::pixel)
             small.depth->value = std::max(1.0, small.depth->value * scale);
+        if (small.bevel && small.bevel->unit == Length::Unit::pixel) small.bevel->value *= scale;
         std::vector<ViewScore> scores(candidates.size());
         parallel_for(candidates.size(), control, [&](std::size_t i) {
             const Control one{control.stop, {}, 1};
@@ -141,9 +143,11 @@ Vec3f best_direction(const Subject& subject, const FrameSubject& frame, const Ca
 
     std::vector<std::size_t> all(directions.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    std::vector<std::size_t> best = ranked(all, scores_at(all, 256));
+    // Straight walls are cheaper to plan and lead to the same few.
+    const HoleStyle rough = params.style == HoleStyle::cutaway ? HoleStyle::hole : params.style;
+    std::vector<std::size_t> best = ranked(all, scores_at(all, 256, rough));
     best.resize(std::min<std::size_t>(best.size(), 5));
-    return directions[ranked(best, scores_at(best, 512)).front()];
+    return directions[ranked(best, scores_at(best, 512, params.style)).front()];
 }
 
 } // namespace porthole
