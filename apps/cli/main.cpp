@@ -188,9 +188,9 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
          {"hull", HoleShape::hull},
          {"box", HoleShape::box}},
         "Outline of a cutaway: the targets' own, smoothed, their convex hull or box (default smooth)");
-    add_read(app, "--bevel", "Width of a cutaway's chamfer; 0: straight walls (default: as the wall is thick)",
-             "N[px|%|mm]",
-             [&o](const std::string& text, const std::string& option) { o.plan.bevel = parse_length(text, option, true); });
+    add_read(
+        app, "--bevel", "Width of a cutaway's chamfer; 0: straight walls (default: as the wall is thick)", "N[px|%|mm]",
+        [&o](const std::string& text, const std::string& option) { o.plan.bevel = parse_length(text, option, true); });
     app.add_option("--angle", o.plan.angle_deg,
                    "Degrees by which a cutaway's walls lean back, all the way down, instead of a chamfer")
         ->type_name("DEGREES")
