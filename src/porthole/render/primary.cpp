@@ -156,7 +156,7 @@ void Camera::trace_levels(const Samples16& samples, const float (&depth_per_t)[k
             if (!asks[i]) packet.clear(i);
         }
         if (any) {
-            const CapLanes found = find_caps(*bvh_, *cut_, caps_->solids, packet, lanes);
+            const CapLanes found = find_caps(*bvh_, *cut_, *caps_, packet, lanes);
             for (int i = 0; i < kLanes; ++i)
                 for (std::size_t k = 0; k < levels && asks[i]; ++k) capped.cap[k][i] = found.cap[k][i];
         }

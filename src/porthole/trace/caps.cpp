@@ -14,14 +14,6 @@ namespace {
 constexpr int kTile = 64;
 constexpr float kChamferStep = 2, kFloorStep = 16; ///< pixel sizes
 
-/// Levels that have parts to cap.
-struct CappedLevels {
-    std::uint32_t mask = 0; ///< ray mask
-    bool any[kMostLevels] = {}, solids[kMostLevels] = {};
-    bool doubtful = false; ///< among them parts with gaps: rays must be followed to their end
-    [[nodiscard]] bool at(std::size_t level, bool chamfer) const { return chamfer ? any[level] : solids[level]; }
-};
-
 /// Whether some rays find the part's surface open, so that one which went into it may have come
 /// out through a gap.
 bool has_gaps(const MeshSolid& solid) { return solid.by == ClosedBy::rays && solid.balanced_lines < solid.lines; }
@@ -155,8 +147,8 @@ float deepest(const CappedLevels& capped, const CutLanes& lanes, std::size_t lev
     return t;
 }
 
-} // namespace
-
+/// Whether depths `a` and `b` of neighbouring pixels of one level are parted by a wall of the
+/// cut rather than joined by its slope.
 bool is_cut_step(const View& view, const CutDepth& a, const CutDepth& b) {
     const float near = std::min(a.depth, b.depth), far = std::max(a.depth, b.depth);
     if (near == -kInfinity) return far > -kInfinity;
@@ -164,10 +156,11 @@ bool is_cut_step(const View& view, const CutDepth& a, const CutDepth& b) {
     return far - near > (a.chamfer != b.chamfer ? kChamferStep : kFloorStep) * view.pixel_size(near);
 }
 
-CapLanes find_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solids, RayHit16& rays,
-                   const CutLanes& lanes) {
+} // namespace
+
+CapLanes find_caps(const Bvh& bvh, const Cut& cut, const Caps& known, RayHit16& rays, const CutLanes& lanes) {
     CapLanes caps;
-    const CappedLevels capped = capped_levels(bvh.scene(), cut, solids);
+    const CappedLevels& capped = known.capped;
     if (capped.mask == 0) return caps;
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {
@@ -179,7 +172,7 @@ CapLanes find_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> so
     }
     if (!any) return caps;
     Passages passages;
-    find_passages(bvh, cut, capped, solids, rays, passages);
+    find_passages(bvh, cut, capped, known.solids, rays, passages);
     Inside inside;
     for (int i = 0; i < kLanes; ++i) {
         const std::vector<Passage>& lane = passages[std::size_t(i)];
@@ -452,6 +445,7 @@ Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solid
     const Rect box = hole_box(cut);
     if (capped.mask == 0 || box.empty()) return caps;
     caps.solids = solids;
+    caps.capped = capped;
     caps.levels.assign(cut.levels.size(), Image<SurfaceRef>());
     for (std::size_t k = 0; k < cut.levels.size(); ++k)
         if (capped.any[k]) caps.levels[k] = Image<SurfaceRef>(box);

@@ -282,7 +282,7 @@ TEST(Caps, AtSamplesAreThoseAtTheirPixelCentres) {
                 lanes.chamfer[k][i] = d.chamfer;
             }
         }
-        const CapLanes found = find_caps(bvh, bench.cut, bench.solids, rays, lanes);
+        const CapLanes found = find_caps(bvh, bench.cut, caps, rays, lanes);
         for (int i = 0; i < kLanes; ++i) EXPECT_EQ(found.cap[0][i], caps.at(0, x, 50 + i)) << x << ' ' << i;
     }
 }
