@@ -31,6 +31,10 @@ if(PORTHOLE_SANITIZE)
                          -fno-sanitize-recover=all
                          -Wno-maybe-uninitialized) # GCC 12 sees it in std::regex, under sanitizers only
   target_link_options(porthole_flags INTERFACE -fsanitize=${PORTHOLE_SANITIZE})
+  if(PORTHOLE_SANITIZE MATCHES thread)
+    target_link_options(porthole_flags INTERFACE
+      "$<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:-Wl,--version-script=${CMAKE_CURRENT_LIST_DIR}/executable.map>")
+  endif()
 endif()
 
 # porthole_folder(NAME [SOURCES ...] [FOLDERS porthole folders it includes] [LIBRARIES ...])
