@@ -106,6 +106,16 @@ inline const char* name_of(Shading shading) {
     }
     return nullptr;
 }
+inline const char* name_of(Refine refine) {
+    switch (refine) {
+    case Refine::full: return "full";
+    case Refine::adaptive: return "adaptive";
+    case Refine::paper1: return "paper1";
+    case Refine::paper2: return "paper2";
+    case Refine::expansion: return "expansion";
+    }
+    return nullptr;
+}
 
 /// `Params`, const or not.
 template <typename T, typename Params>
@@ -129,12 +139,13 @@ template <Is<PlanParams> T, typename Visit> void for_each(T& params, Visit&& vis
 }
 
 template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
-    auto& [samples, ao_samples, shadows, max_bounces, shading, emphasis, lines, cap, cap_tint, rim_px, background] =
-        params;
+    auto& [samples, ao_samples, shadows, max_bounces, refine, shading, emphasis, lines, cap, cap_tint, rim_px,
+           background] = params;
     visit("samples", samples);
     visit("ao_samples", ao_samples);
     visit("shadows", shadows);
     visit("max_bounces", max_bounces);
+    visit("refine", refine);
     visit("shading", shading);
     visit("emphasis", emphasis);
     visit("cap", cap);

@@ -18,6 +18,15 @@ namespace porthole {
 enum class Emphasis : std::uint8_t { accent, saturate, none };
 enum class Shading : std::uint8_t { raytraced, flat };
 
+/// Which pixels are traced; the others take their colour from those around. See docs/method.md.
+enum class Refine : std::uint8_t {
+    full,     ///< all of them: the oracle
+    adaptive, ///< blocks of 4x4 where neighbouring ones differ
+    paper1,   ///< the paper's first version: macro pixels, each compared with three neighbours
+    paper2,   ///< its second: guide pixels of a block
+    expansion ///< selective expansion: blocks that a first sampling hits, grown until nothing new is hit
+};
+
 /// How the cut through solid material is drawn.
 enum class CapStyle : std::uint8_t {
     own,  ///< the part's colour, darker or greyer than its outside
@@ -34,7 +43,8 @@ struct RenderParams {
     int samples = 8;    ///< most samples per pixel, [1, 4096], spent where neighbours differ; 1: one at each centre
     int ao_samples = 4; ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
     bool shadows = true;
-    int max_bounces = 6;                  ///< reflections, refractions and blended surfaces along one path, [0, 64]
+    int max_bounces = 6; ///< reflections, refractions and blended surfaces along one path, [0, 64]
+    Refine refine = Refine::full;
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
     Lines lines = Lines::rim;
