@@ -85,7 +85,7 @@ Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const Ren
     Picture picture(view, params, camera, view.window());
     mark_everything(picture, covering);
     draw(picture, bvh, targets, nullptr, nullptr, control);
-    return {std::move(picture.color), std::move(picture.buffer.ids), {}, picture.rays.get()};
+    return {std::move(picture.color), std::move(picture.buffer.ids), {}, {}, picture.rays.get()};
 }
 
 Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut& cut,

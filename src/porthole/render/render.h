@@ -73,7 +73,8 @@ struct Frame {
         cap = 1,      ///< the cut through solid material
         open_back = 2 ///< the back of a part that has no caps: open, or around the eye
     };
-    Mask inside; ///< 0 elsewhere; empty without a hole
+    Mask inside;   ///< 0 elsewhere; empty without a hole
+    Mask inferred; ///< 1 where id and depth were not traced but taken from around; empty: all were
     RayCounts rays;
 };
 
