@@ -2,9 +2,10 @@
 
 #include <embree3/rtcore.h>
 
-#include <limits>
+#include <algorithm>
 
 #include "porthole/base/parallel.h"
+#include "porthole/trace/packet.h"
 
 namespace porthole::bench {
 
@@ -54,25 +55,19 @@ BareEmbree::~BareEmbree() {
 std::int64_t BareEmbree::trace(const View& view) const {
     const FlushDenormals flush;
     std::int64_t hits = 0;
-    alignas(64) int valid[16];
-    std::fill(valid, valid + 16, -1);
-    RTCRayHit16 packet;
+    alignas(64) int valid[kLanes];
+    std::fill(valid, valid + kLanes, -1);
+    RayHit16 packet;
+    float depth_per_t[kLanes];
     for (int y0 = 0; y0 + 4 <= view.height; y0 += 4)
         for (int x0 = 0; x0 + 4 <= view.width; x0 += 4) {
-            for (int i = 0; i < 16; ++i) {
-                const Ray r = view.ray(float(x0 + i % 4) + 0.5f, float(y0 + i / 4) + 0.5f);
-                packet.ray.org_x[i] = r.origin.x, packet.ray.org_y[i] = r.origin.y, packet.ray.org_z[i] = r.origin.z;
-                packet.ray.dir_x[i] = r.direction.x, packet.ray.dir_y[i] = r.direction.y;
-                packet.ray.dir_z[i] = r.direction.z;
-                packet.ray.tnear[i] = 0, packet.ray.tfar[i] = std::numeric_limits<float>::infinity();
-                packet.ray.time[i] = 0, packet.ray.mask[i] = 0xFFFFFFFFu, packet.ray.id[i] = 0, packet.ray.flags[i] = 0;
-                packet.hit.geomID[i] = packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-            }
+            // The library's own rays: a slower way to make them would flatter it.
+            set_block_rays(packet, depth_per_t, view, x0, y0, view.window(), 0xFFFFFFFFu);
             RTCIntersectContext context;
             rtcInitIntersectContext(&context);
             context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-            rtcIntersect16(valid, state_->top, &context, &packet);
-            for (int i = 0; i < 16; ++i) hits += packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+            rtcIntersect16(valid, state_->top, &context, reinterpret_cast<RTCRayHit16*>(&packet));
+            for (int i = 0; i < kLanes; ++i) hits += packet.geometry[i] != RTC_INVALID_GEOMETRY_ID;
         }
     return hits;
 }

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "porthole/trace/packet.h"
+
 namespace porthole {
 
 namespace {
@@ -27,26 +29,6 @@ template <typename Wanted> bool any_in_block(Rect tile, int x0, int y0, const Wa
         for (int x = block.x0; x < block.x1; ++x)
             if (wanted(x, y)) return true;
     return false;
-}
-
-/// Rays through the centres of a 4x4 block; lane i is pixel (x0 + i % 4, y0 + i / 4). Lanes
-/// outside `window` are inactive.
-/// @return number of active lanes
-int set_block_rays(RayHit16& rays, float (&depth_per_t)[kLanes], const View& view, int x0, int y0, Rect window,
-                   std::uint32_t mask = kMaskAll) {
-    int active = 0;
-    for (int i = 0; i < kLanes; ++i) {
-        const int x = x0 + (i & 3), y = y0 + (i >> 2);
-        if (!window.contains(x, y)) {
-            rays.clear(i);
-            continue;
-        }
-        const Ray ray = view.ray(float(x) + 0.5f, float(y) + 0.5f);
-        rays.set(i, ray.origin, ray.direction, 0.0f, kInfinity, mask);
-        depth_per_t[i] = ray.depth_per_t;
-        ++active;
-    }
-    return active;
 }
 
 void store_ids(const RayHit16& rays, const float (&depth_per_t)[kLanes], int x0, int y0, IdBuffer& ids) {
@@ -401,12 +383,12 @@ FineCoverage trace_fine(const Bvh& bvh, const View& view, Rect window, const Con
         std::int64_t n = 0;
         for (int y = tile.y0; y < tile.y1; ++y)
             for (int x = tile.x0; x < tile.x1; ++x) {
+                float px[kLanes], py[kLanes];
                 for (int i = 0; i < kLanes; ++i) {
                     const Vec2f p = fine_position(x, y, i);
-                    const Ray ray = view.ray(p.x, p.y);
-                    packet.set(i, ray.origin, ray.direction, 0.0f, kInfinity);
-                    depth_per_t[i] = ray.depth_per_t;
+                    px[i] = p.x, py[i] = p.y;
                 }
+                set_rays(packet, depth_per_t, view, px, py);
                 intersect(bvh, packet, Coherence::coherent);
                 for (int i = 0; i < kLanes; ++i) {
                     if (!packet.hit(i)) continue;
