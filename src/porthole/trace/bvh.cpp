@@ -48,12 +48,18 @@ std::uint64_t mixed(std::uint64_t h, std::uint64_t v) {
 
 std::uint64_t hash_bytes(std::uint64_t h, const void* data, std::size_t n) {
     const auto* bytes = static_cast<const std::byte*>(data);
-    std::size_t i = 0;
-    for (; i + 8 <= n; i += 8) {
+    const auto word = [&](std::size_t at) {
         std::uint64_t v;
-        std::memcpy(&v, bytes + i, 8);
-        h = mixed(h, v);
-    }
+        std::memcpy(&v, bytes + at, 8);
+        return v;
+    };
+    std::size_t i = 0;
+    // Four chains side by side: one alone waits for its multiplications.
+    std::uint64_t lane[4] = {h, h + 1, h + 2, h + 3};
+    for (; i + 32 <= n; i += 32)
+        for (std::size_t k = 0; k < 4; ++k) lane[k] = mixed(lane[k], word(i + 8 * k));
+    for (const std::uint64_t l : lane) h = mixed(h, l);
+    for (; i + 8 <= n; i += 8) h = mixed(h, word(i));
     std::uint64_t tail = 0;
     if (i < n) std::memcpy(&tail, bytes + i, n - i); // an empty mesh has no bytes to point at
     return mixed(h, tail ^ (std::uint64_t(n) << 32));
@@ -262,11 +268,17 @@ MeshBvhs build_mesh_bvhs(const Scene& scene, const BvhParams& params, const Cont
     state->primitives.resize(scene.meshes.size());
     state->hashes.resize(scene.meshes.size());
 
+    // From here on memory decides: a large model is to stay within 100 bytes a triangle in all.
+    constexpr std::size_t kCompactFrom = 2'000'000;
+    std::size_t triangles = 0;
+    for (const Mesh& mesh : scene.meshes) triangles += mesh.triangles.size();
+    const bool compact =
+        params.layout == BvhLayout::automatic ? triangles >= kCompactFrom : params.layout == BvhLayout::compact;
     const auto scene_of = [&](RTCGeometry geometry) {
         const RTCDevice device = state->device.value;
         rtcCommitGeometry(geometry);
         SceneHandle built(rtcNewScene(device));
-        rtcSetSceneFlags(built.value, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneFlags(built.value, compact ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
         rtcAttachGeometryByID(built.value, geometry, 0);
         rtcCommitScene(built.value);
         check_device(device);

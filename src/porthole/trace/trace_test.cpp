@@ -1,6 +1,7 @@
 // Ray queries against constructed scenes and against single rays.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <future>
 #include <optional>
@@ -95,6 +96,49 @@ TEST(Trace, ThreadsAndOrderOfPartsDoNotMatter) {
             EXPECT_EQ(*first, ids) << threads << " threads";
         }
     }
+}
+
+TEST(Trace, HitsDependNeitherOnLayoutNorOnThreads) {
+    // Every triangle twice, far apart in the mesh: whichever of the two a ray hits depends on the
+    // tree. Large enough for Embree to build with several threads.
+    Builder b(90);
+    Mesh& mesh = b.scene.meshes[b.sphere_mesh];
+    std::vector<Vec3u> again = mesh.triangles;
+    std::shuffle(again.begin(), again.end(), std::mt19937(5));
+    mesh.triangles.insert(mesh.triangles.end(), again.begin(), again.end());
+    mesh.submeshes = {{0, std::uint32_t(mesh.triangles.size()), 0}};
+    b.add_sphere("outer", {}, 2);
+    b.add_sphere("inner", {0.3, 0, 1.2}, 0.9);
+    const Scene scene = std::move(b.scene);
+    const View view = view_from({1, 2, 6}, 96, 64);
+
+    struct Hit {
+        std::uint32_t part, triangle;
+        float t, u, v;
+        bool operator==(const Hit&) const = default;
+    };
+    std::optional<std::vector<Hit>> first;
+    for (const BvhLayout layout : {BvhLayout::fast, BvhLayout::compact})
+        for (const int threads : {1, 2, 7, 7}) {
+            const MeshBvhs meshes = build_mesh_bvhs(scene, {.layout = layout}, with_threads(threads));
+            const Bvh bvh = build_bvh(meshes, all_parts(scene));
+            std::vector<Hit> hits;
+            for (int y = 0; y < view.height; ++y)
+                for (int x = 0; x < view.width; x += kLanes) {
+                    RayHit16 rays;
+                    for (int i = 0; i < kLanes; ++i) {
+                        const Ray ray = view.ray(float(x + i) + 0.5f, float(y) + 0.5f);
+                        rays.set(i, ray.origin, ray.direction, 0, kInfinity);
+                    }
+                    intersect(bvh, rays, Coherence::coherent);
+                    for (int i = 0; i < kLanes; ++i)
+                        if (rays.hit(i))
+                            hits.push_back({rays.instance[i], rays.triangle[i], rays.tfar[i], rays.u[i], rays.v[i]});
+                }
+            EXPECT_GT(hits.size(), 1000u);
+            if (!first) first = hits;
+            EXPECT_TRUE(*first == hits) << int(layout) << ", " << threads << " threads";
+        }
 }
 
 TEST(Trace, PartDuplicatedInPlaceChangesNothing) {
