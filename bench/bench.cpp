@@ -12,6 +12,7 @@
 #include <random>
 
 #include "bare_embree.h"
+#include "contours.h"
 #include "cut_frame.h"
 #include "porthole/io/load.h"
 #include "porthole/plan.h"
@@ -180,6 +181,7 @@ int main(int argc, char** argv) {
         add_benchmarks({"worm", models + "assembly/virtual_worm.glb", {"pm5d"}});
     }
     if (const char* assembly = std::getenv("PORTHOLE_ASSEMBLY")) add_benchmarks({"assembly", assembly, {"part_00"}});
+    porthole::bench::add_contour_benchmarks();
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();

@@ -213,10 +213,12 @@ void add_reveal(CLI::App& app, RevealOptions& o) {
              });
     add_list(app, "--solid", o.solid, "Parts that are capped wherever they are cut, though they hold a target");
     add_list(app, "--shell", o.shell, "Parts that are capped on the chamfer only, though they hold no target");
-    add_choice<ContourMethod>(
-        app, "--contours", o.plan.contours,
-        {{"exact", ContourMethod::exact}, {"full", ContourMethod::full}, {"paper", ContourMethod::paper}},
-        "How targets' outlines are found (default exact)");
+    add_choice<ContourMethod>(app, "--contours", o.plan.contours,
+                              {{"exact", ContourMethod::exact},
+                               {"full", ContourMethod::full},
+                               {"fast", ContourMethod::fast},
+                               {"paper", ContourMethod::paper}},
+                              "How targets' outlines are found (default exact)");
     add_choice<Tight>(app, "--tight", o.plan.tight,
                       {{"refuse", Tight::refuse}, {"open", Tight::open}, {"ghost", Tight::ghost}},
                       "Targets without room for a band: refused, or opened all the same; ghost: the whole picture in "

@@ -6,32 +6,13 @@
 #include <cmath>
 
 #include "porthole/plan_steps.h"
+#include "porthole/trace/outline.h"
 
 namespace porthole {
 
 namespace {
 
 constexpr int kThinPixels = 16; ///< fewer pixel centres than this: sub-pixel samples decide
-
-/// Smallest rectangle around the non-zero pixels; empty if there are none.
-template <typename T, typename Set> Rect bounding_rect(const Image<T>& image, Set&& set) {
-    const Rect w = image.window();
-    Rect r{w.x1, w.y1, w.x0, w.y0};
-    for (int y = w.y0; y < w.y1; ++y)
-        for (int x = w.x0; x < w.x1; ++x)
-            if (set(image(x, y))) {
-                r.x0 = std::min(r.x0, x), r.x1 = std::max(r.x1, x + 1);
-                r.y0 = std::min(r.y0, y), r.y1 = std::max(r.y1, y + 1);
-            }
-    return r.x0 < r.x1 ? r : Rect{};
-}
-
-/// Pixels that the marked blocks cover.
-Rect pixel_rect(const BlockMask& blocks, Rect window) {
-    const Rect b = bounding_rect(blocks.marked, [](std::uint8_t v) { return v != 0; });
-    if (b.empty()) return {};
-    return Rect{4 * b.x0, 4 * b.y0, 4 * b.x1, 4 * b.y1}.intersected(window);
-}
 
 /// Where `part` alone is seen; thin parts by sub-pixel samples.
 TargetView view_target(const Subject& subject, const View& view, Rect window, PartId part, const Control& control,
@@ -177,6 +158,21 @@ struct Windows {
     Rect targets;     ///< where in it targets can be, and plan.window
 };
 
+/// Ids of the opened targets in windows.targets.
+IdBuffer target_ids(const Subject& subject, const Bvh& bvh, ContourMethod method, const Windows& windows,
+                    const BlockMask& blocks, ViewPlan& plan, const Control& control) {
+    const View& view = plan.view;
+    std::int64_t& rays = plan.rays.targets;
+    if (method == ContourMethod::full)
+        return cropped(trace_ids(bvh, view, windows.all_targets, control, &rays), windows.targets);
+    if (method != ContourMethod::fast) return trace_ids_in_blocks(bvh, view, windows.targets, blocks, control, &rays);
+    const std::vector<Vec2i> seeds = outline_seeds(subject.scene(), plan.opened, view);
+    Outline outline = trace_outline(bvh, view, windows.targets, blocks, seeds, control);
+    trace_inferred(outline, bvh, view, control);
+    rays += outline.rays;
+    return std::move(outline.ids);
+}
+
 /// Everything of the plan that depends on which targets are opened.
 void plan_opened_group(const Subject& subject, const PlanParams& params, const HoleParams& band, const Windows& windows,
                        const BlockMask& blocks, ViewPlan& plan, const Control& control) {
@@ -186,10 +182,7 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     if (!all) some.emplace(build_bvh(*subject.meshes, plan.opened));
     const Bvh& bvh = all ? subject.target_bvh : *some;
 
-    IdBuffer ids = params.contours == ContourMethod::full
-                       ? trace_ids(bvh, view, windows.all_targets, control, &plan.rays.targets)
-                       : trace_ids_in_blocks(bvh, view, windows.targets, blocks, control, &plan.rays.targets);
-    if (params.contours == ContourMethod::full) ids = cropped(ids, windows.targets);
+    IdBuffer ids = target_ids(subject, bvh, params.contours, windows, blocks, plan, control);
     add_thin_targets(subject, view, plan.targets, plan.opened, ids, control, plan.rays.targets);
 
     PaperContours paper;

@@ -22,6 +22,7 @@ namespace porthole {
 enum class ContourMethod : std::uint8_t {
     exact, ///< targets traced in the blocks their boxes touch; equals `full` on every view
     full,  ///< every pixel traced against the targets: the oracle
+    fast,  ///< the outline followed block by block, its inside traced: may miss what is small or thin
     paper  ///< contours followed as the paper does; targets that step 1 misses are missed
 };
 
@@ -137,6 +138,20 @@ struct ViewPlan {
 /// Safe to call concurrently on one subject.
 [[nodiscard]] ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params = {},
                                  const Control& control = {});
+
+/// The targets' contours by themselves, as a picture in motion wants them.
+struct TargetContours {
+    std::vector<Contour> contours; ///< the pixels are those of find_contours() of the target ids in the picture;
+                                   ///< chains may come in another order
+    std::int64_t rays = 0;
+};
+
+/// Contours of all targets in the picture. Methods exact and fast work group by group of the
+/// blocks that the targets' boxes touch; fast infers what is inside the outline.
+/// Cost: fast, about seven rays a contour pixel; exact, one a pixel of the boxes.
+[[nodiscard]] TargetContours find_target_contours(const Subject& subject, const View& view,
+                                                  ContourMethod method = ContourMethod::exact,
+                                                  const Control& control = {});
 
 /// Decides which parts of the cut set are capped: fills solids, caps and cut.cap of a plan.
 /// Not part of plan_view(), as views that are only weighed need no caps.

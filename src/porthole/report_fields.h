@@ -12,6 +12,7 @@ inline const char* name_of(ContourMethod method) {
     switch (method) {
     case ContourMethod::exact: return "exact";
     case ContourMethod::full: return "full";
+    case ContourMethod::fast: return "fast";
     case ContourMethod::paper: return "paper";
     }
     return nullptr;

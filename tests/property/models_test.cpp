@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -123,6 +124,53 @@ TEST_P(Models, ExactEqualsFullFromRandomDirections) {
     RecordProperty("opened", opened);
     RecordProperty("thin", thin);
     EXPECT_GT(opened, 0);
+}
+
+TEST_P(Models, FastContoursMissLittleAndAddNothing) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    const Scene scene = load_scene((shared / "models" / GetParam().file).string());
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const std::vector<PartId> targets = select_parts(scene, GetParam().targets);
+    const Subject subject = make_subject(meshes, targets);
+    const FrameSubject framing = frame_subject(scene, targets);
+    const auto pixels = [&](const View& view, ContourMethod method, int threads, std::int64_t& rays) {
+        const TargetContours found = find_target_contours(subject, view, method, test::with_threads(threads));
+        rays += found.rays;
+        return contour_pixels(found.contours);
+    };
+    const auto before = [](Vec2i a, Vec2i b) { return a.y != b.y ? a.y < b.y : a.x < b.x; };
+
+    std::int64_t all = 0, missed = 0, full_rays = 0, exact_rays = 0, fast_rays = 0, ignored = 0;
+    int k = 0;
+    for (const Vec3f direction : random_directions(kDirections, 20261123)) {
+        const View view = view_from_direction(framing, direction, {}, 640, 360);
+        const std::vector<Vec2i> full = pixels(view, ContourMethod::full, 2, full_rays);
+        ASSERT_EQ(pixels(view, ContourMethod::exact, 1 + k % 3, exact_rays), full);
+        const std::vector<Vec2i> fast = pixels(view, ContourMethod::fast, 1 + k++ % 3, fast_rays);
+        ASSERT_EQ(pixels(view, ContourMethod::fast, 7, ignored), fast);
+        std::vector<Vec2i> right;
+        std::set_intersection(fast.begin(), fast.end(), full.begin(), full.end(), std::back_inserter(right), before);
+        // A border pixel beside one that was missed is the only way to find what is none.
+        EXPECT_LE(fast.size() - right.size(), full.size() - right.size());
+        all += std::int64_t(full.size()), missed += std::int64_t(full.size() - right.size());
+
+        // In a plan every id comes from a ray: what is there is right, what is missed is nothing.
+        if (k > 4) continue;
+        const IdBuffer exact_ids = plan_view(subject, view).target_ids;
+        const IdBuffer fast_ids = plan_view(subject, view, {.contours = ContourMethod::fast}).target_ids;
+        ASSERT_EQ(exact_ids.window(), fast_ids.window());
+        for (std::size_t i = 0; i < fast_ids.id.pixels().size(); ++i)
+            if (fast_ids.id.pixels()[i] != kNoPart) {
+                ASSERT_EQ(fast_ids.id.pixels()[i], exact_ids.id.pixels()[i]);
+                ASSERT_EQ(fast_ids.depth.pixels()[i], exact_ids.depth.pixels()[i]);
+            }
+    }
+    RecordProperty("contour_pixels", int(all));
+    RecordProperty("missed", int(missed));
+    RecordProperty("rays_full_exact_fast",
+                   std::to_string(full_rays) + ' ' + std::to_string(exact_rays) + ' ' + std::to_string(fast_rays));
+    EXPECT_LT(fast_rays, exact_rays);
+    EXPECT_LE(double(missed), 0.02 * double(all));
 }
 
 TEST_P(Models, ClearanceAgreesWithOpenCv) {

@@ -173,23 +173,22 @@ IdBuffer trace_ids_in_blocks(const Bvh& bvh, const View& view, Rect window, cons
     return traced_ids(bvh, view, window, &blocks, control, rays);
 }
 
-std::vector<PartId> trace_ids_at(const Bvh& bvh, const View& view, std::span<const Vec2i> pixels) {
+std::vector<PartId> trace_ids_at(const Bvh& bvh, const View& view, std::span<const Vec2i> pixels, std::uint32_t mask) {
     const FlushDenormals flush;
     std::vector<PartId> ids(pixels.size(), kNoPart);
     RayHit16 packet;
+    float x[kLanes] = {}, y[kLanes] = {}, depth_per_t[kLanes];
     for (std::size_t first = 0; first < pixels.size(); first += kLanes) {
-        for (std::size_t i = 0; i < kLanes; ++i) {
-            if (first + i >= pixels.size()) {
-                packet.clear(int(i));
-                continue;
-            }
-            const Vec2i p = pixels[first + i];
-            const Ray ray = view.ray(float(p.x) + 0.5f, float(p.y) + 0.5f);
-            packet.set(int(i), ray.origin, ray.direction, 0.0f, kInfinity);
+        const int n = int(std::min<std::size_t>(kLanes, pixels.size() - first));
+        for (int i = 0; i < n; ++i) {
+            const Vec2i p = pixels[first + std::size_t(i)];
+            x[i] = float(p.x) + 0.5f, y[i] = float(p.y) + 0.5f;
         }
+        set_rays(packet, depth_per_t, view, x, y, mask);
+        for (int i = n; i < kLanes; ++i) packet.clear(i);
         intersect(bvh, packet, Coherence::incoherent);
-        for (std::size_t i = 0; i < kLanes && first + i < pixels.size(); ++i)
-            if (packet.hit(int(i))) ids[first + i] = packet.part(int(i));
+        for (int i = 0; i < n; ++i)
+            if (packet.hit(i)) ids[first + std::size_t(i)] = packet.part(i);
     }
     return ids;
 }

@@ -43,8 +43,9 @@ struct BlockMask {
 [[nodiscard]] IdBuffer trace_ids_in_blocks(const Bvh& bvh, const View& view, Rect window, const BlockMask& blocks,
                                            const Control& control = {}, std::int64_t* rays = nullptr);
 
-/// Ids at given pixels, for the paper's lazy follower.
-[[nodiscard]] std::vector<PartId> trace_ids_at(const Bvh& bvh, const View& view, std::span<const Vec2i> pixels);
+/// Ids at given pixels of the parts that `mask` lets rays hit, for the paper's lazy follower.
+[[nodiscard]] std::vector<PartId> trace_ids_at(const Bvh& bvh, const View& view, std::span<const Vec2i> pixels,
+                                               std::uint32_t mask = kMaskAll);
 
 /// A part that lies in front of targets.
 struct PartSpan {
