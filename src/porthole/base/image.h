@@ -26,14 +26,22 @@ struct Rect {
     friend constexpr bool operator==(const Rect&, const Rect&) = default;
 };
 
+/// Tells the system that memory not yet touched will all be: it then comes in large pages, which
+/// takes a fraction of the time of small ones. Small blocks are left alone.
+void expect_use(void* memory, std::size_t bytes);
+
 /// Row-major pixels of `window`; coordinates are absolute, so that a crop and the
 /// full picture share them.
 template <typename T> class Image {
 public:
     Image() = default;
-    explicit Image(Rect window, T fill = T{})
-        : window_(window),
-          pixels_(window.empty() ? 0 : std::size_t(window.width()) * std::size_t(window.height()), fill) {}
+    explicit Image(Rect window, T fill = T{}) : window_(window) {
+        if (window.empty()) return;
+        const std::size_t n = std::size_t(window.width()) * std::size_t(window.height());
+        pixels_.reserve(n);
+        expect_use(pixels_.data(), n * sizeof(T));
+        pixels_.resize(n, fill);
+    }
     Image(std::int32_t width, std::int32_t height, T fill = T{}) : Image(Rect{0, 0, width, height}, fill) {}
 
     [[nodiscard]] Rect window() const { return window_; }

@@ -58,6 +58,9 @@ template <typename T> constexpr Vec3<T>& operator*=(Vec3<T>& a, T s) { return a 
 template <typename T> constexpr Vec4<T> operator+(Vec4<T> a, Vec4<T> b) {
     return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w};
 }
+template <typename T> constexpr Vec4<T> operator-(Vec4<T> a, Vec4<T> b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w};
+}
 template <typename T> constexpr Vec4<T> operator*(Vec4<T> a, T s) { return {a.x * s, a.y * s, a.z * s, a.w * s}; }
 
 template <typename T> constexpr T dot(Vec2<T> a, Vec2<T> b) { return a.x * b.x + a.y * b.y; }

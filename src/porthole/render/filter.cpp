@@ -10,6 +10,9 @@ constexpr int kApron = 2;
 constexpr int kRow = FilteredTile::kSize + 2 * kApron + 12; // padded: whole vectors at every offset
 constexpr int kRows = FilteredTile::kSize + 2 * kApron;
 constexpr float kSimilarNormal = 0.9f;
+constexpr int kVector = 16; ///< widths are rounded up to this
+
+int whole_vectors(int width) { return (width + kVector - 1) / kVector * kVector; }
 
 /// A tile with its apron, one plane per quantity, so that rows are filtered as vectors.
 struct Planes {
@@ -29,9 +32,10 @@ struct Content {
 
 Content load(const GBuffer& buffer, const View& view, Rect tile, Planes& p) {
     Content content;
-    for (int row = 0; row < kRows; ++row) {
+    const int columns = std::min(kRow, whole_vectors(tile.width()) + 2 * kApron);
+    for (int row = 0; row < tile.height() + 2 * kApron; ++row) {
         const int y = tile.y0 - kApron + row;
-        for (int column = 0; column < kRow; ++column) {
+        for (int column = 0; column < columns; ++column) {
             const int x = tile.x0 - kApron + column;
             p.key[row][column] = -1;
             p.px[row][column] = p.py[row][column] = p.pz[row][column] = 0;
@@ -66,9 +70,10 @@ struct Sums {
     alignas(64) float lamps[3][FilteredTile::kSize], weight[FilteredTile::kSize];
 };
 
-template <int kChannels> void add_neighbours(const Planes& p, int row, int dx, int dy, float weight, Sums& sums) {
+template <int kChannels>
+void add_neighbours(const Planes& p, int row, int dx, int dy, int columns, float weight, Sums& sums) {
     const int other = row + dy;
-    for (int i = 0; i < FilteredTile::kSize; ++i) {
+    for (int i = 0; i < columns; ++i) {
         const int a = i + kApron, b = a + dx;
         const float ex = p.px[other][b] - p.px[row][a], ey = p.py[other][b] - p.py[row][a],
                     ez = p.pz[other][b] - p.pz[row][a];
@@ -92,18 +97,19 @@ void filter_tile(const GBuffer& buffer, const View& view, Rect tile, FilteredTil
     const Content content = load(buffer, view, tile, *planes);
     if (!content.any) return;
     Sums sums;
+    const int columns = whole_vectors(tile.width());
     for (int y = 0; y < tile.height(); ++y) {
         sums = {};
         for (int dy = -kApron; dy <= kApron; ++dy)
             for (int dx = -kApron; dx <= kApron; ++dx) {
                 const float weight = (std::abs(dx) == kApron ? 0.5f : 1.0f) * (std::abs(dy) == kApron ? 0.5f : 1.0f);
                 if (content.colored)
-                    add_neighbours<3>(*planes, y + kApron, dx, dy, weight, sums);
+                    add_neighbours<3>(*planes, y + kApron, dx, dy, columns, weight, sums);
                 else
-                    add_neighbours<1>(*planes, y + kApron, dx, dy, weight, sums);
+                    add_neighbours<1>(*planes, y + kApron, dx, dy, columns, weight, sums);
             }
         const int first = y * FilteredTile::kSize;
-        for (int i = 0; i < FilteredTile::kSize; ++i) {
+        for (int i = 0; i < tile.width(); ++i) {
             out.ambient[first + i] = sums.all[i] > 0 ? sums.open[i] / sums.all[i] : 1.0f;
             const float scale = sums.weight[i] > 0 ? 1.0f / (255.0f * sums.weight[i]) : 0.0f;
             for (int c = 0; c < 3; ++c) out.lamps[c][first + i] = sums.lamps[content.colored ? c : 0][i] * scale;

@@ -27,9 +27,9 @@ struct Askers {
     std::vector<Vec2i> pixels;
 };
 
-/// Camera rays, geometry and lamps of one block of 4x4 pixels.
-void gather_block(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile,
-                  int bx, int by, Askers& askers, RayCounts& rays) {
+/// Camera rays and geometry of one block of 4x4 pixels, its lamps too if its light is wanted.
+void gather_block(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, int bx,
+                  int by, bool light, Askers& askers, RayCounts& rays) {
     GBuffer& buffer = picture.buffer;
     Samples16 samples;
     samples.at_centres = true;
@@ -37,7 +37,7 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
     for (int i = 0; i < kLanes; ++i) {
         const int x = bx + i % kCell, y = by + i / kCell;
         samples.x[i] = float(x) + 0.5f, samples.y[i] = float(y) + 0.5f;
-        if (!tile.contains(x, y)) continue;
+        if (!buffer.pixels.contains(x, y)) continue;
         const Pixel& pixel = buffer.pixels(x, y);
         samples.active[i] = pixel.has(Pixel::traced) || is_covered(picture, x, y);
         samples.may_open[i] = pixel.has(Pixel::may_open);
@@ -71,7 +71,7 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
         points[n] = {point.position, point.start, point.flat_normal, point.normal, seen.in_hole[i], cell_rank(x, y)};
         pixels[n++] = {x, y};
     }
-    if (picture.params.shading == Shading::flat || n == 0) return;
+    if (!light || picture.params.shading == Shading::flat || n == 0) return;
     std::array<Vec3f, kLanes> lamps;
     occlusion.lamps(std::span(points.data(), n), kLampRays, lamps.data(), rays);
     for (std::size_t k = 0; k < n; ++k) {
@@ -181,20 +181,29 @@ void mark_hole(Picture& picture, const Cut& cut) {
         }
 }
 
-void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile) {
+void gather_blocks(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements,
+                   std::span<const Vec2i> blocks, bool light) {
     RayCounts rays;
     Askers askers;
+    for (const Vec2i b : blocks)
+        gather_block(picture, occlusion, placements, b.x * kCell, b.y * kCell, light, askers, rays);
+    gather_ambient(picture, occlusion, askers, rays);
+    picture.rays.add(rays);
+}
+
+void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile) {
     // Larger squares of blocks first to last, so that neighbours in the list are neighbours in
     // the picture.
     constexpr int kSquare = kCell * kCell;
     const Rect w = picture.buffer.window();
+    std::vector<Vec2i> blocks;
     for (int sy = tile.y0 & ~(kSquare - 1); sy < tile.y1; sy += kSquare)
         for (int sx = tile.x0 & ~(kSquare - 1); sx < tile.x1; sx += kSquare)
-            for (int by = sy; by < sy + kSquare; by += kCell)
-                for (int bx = sx; bx < sx + kSquare; bx += kCell)
-                    gather_block(picture, occlusion, placements, tile.intersected(w), bx, by, askers, rays);
-    gather_ambient(picture, occlusion, askers, rays);
-    picture.rays.add(rays);
+            for (int y = sy; y < sy + kSquare; y += kCell)
+                for (int x = sx; x < sx + kSquare; x += kCell)
+                    if (!Rect{x, y, x + kCell, y + kCell}.intersected(w).intersected(tile).empty())
+                        blocks.push_back({x / kCell, y / kCell});
+    gather_blocks(picture, occlusion, placements, blocks, true);
 }
 
 } // namespace porthole

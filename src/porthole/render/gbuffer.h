@@ -42,6 +42,7 @@ struct Pixel {
         in_hole = 2,    ///< its sample obeys the cut
         on_target = 4,  ///< and sees an opened target
         may_open = 8,   ///< some sample of the pixel may be in the hole
+        inferred = 32,  ///< taken from pixels around: with `traced` its light, without it all
         rim = 16,       ///< the rim may pass through the pixel: every sample is needed
         cap = 64,       ///< and sees the cut through solid material
         open_back = 128 ///< or the back of a cut part that has no caps
@@ -54,6 +55,12 @@ struct Pixel {
     std::uint8_t flags = 0;
 
     [[nodiscard]] bool has(Flag f) const { return (flags & f) != 0; }
+    /// Its own light, unfiltered.
+    [[nodiscard]] Reach reach() const {
+        constexpr float k = 1.0f / 255.0f;
+        return {{float(lamps[0]) * k, float(lamps[1]) * k, float(lamps[2]) * k},
+                ambient_all > 0 ? float(ambient_open) / float(ambient_all) : 1.0f};
+    }
 };
 
 /// Light that reaches a pixel's first sample, after the filter. 65535 is all of it.

@@ -47,6 +47,11 @@ void mark_hole(Picture& picture, const Cut& cut);
 /// Pixels that mark_hole() would mark, rounded out to blocks, inside the picture.
 [[nodiscard]] Rect hole_window(const Cut& cut, const View& view);
 
+/// Camera rays of blocks of 4x4 pixels (pixel / 4), and, if their light is wanted, shadow and ambient
+/// rays. Fastest when blocks that follow each other lie close.
+void gather_blocks(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements,
+                   std::span<const Vec2i> blocks, bool light);
+
 /// Pass 1: camera rays through the pixel centres, their shadow and ambient rays.
 void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile);
 

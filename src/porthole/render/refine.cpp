@@ -81,42 +81,57 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
 
 } // namespace
 
+namespace {
+
+/// Pixels of `tile` whose light the filter has to even out.
+Rect grainy(const GBuffer& buffer, Rect tile) {
+    Rect r{tile.x1, tile.y1, tile.x0, tile.y0};
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x) {
+            const Pixel& pixel = buffer.pixels(x, y);
+            if (!pixel.has(Pixel::traced) || pixel.has(Pixel::inferred) || buffer.ids.id(x, y) == kNoPart) continue;
+            r = {std::min(r.x0, x), std::min(r.y0, y), std::max(r.x1, x + 1), std::max(r.y1, y + 1)};
+        }
+    return r;
+}
+
+} // namespace
+
 void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
     GBuffer& buffer = picture.buffer;
     const bool flat = picture.params.shading == Shading::flat;
+    std::vector<Vec2i> todo;
+    for (int y = tile.y0; y < tile.y1; ++y)
+        for (int x = tile.x0; x < tile.x1; ++x)
+            if (buffer.pixels(x, y).has(Pixel::traced)) todo.push_back({x, y});
+    if (todo.empty()) return;
     RayCounts rays;
     FilteredTile filtered;
-    if (!flat) filter_tile(buffer, picture.view, tile, filtered);
-    Shader shader(stage, FilteredTile::kSize * FilteredTile::kSize, false, rays);
-    filtered.tile = tile;
-    for (int y = tile.y0; y < tile.y1; ++y)
-        for (int x = tile.x0; x < tile.x1; ++x) {
-            const Pixel& pixel = buffer.pixels(x, y);
-            if (!pixel.has(Pixel::traced)) continue;
-            const auto slot = std::uint32_t(filtered.index(x, y));
-            const Hit hit = buffer.hit(x, y);
-            if (!hit.any()) {
-                shader.miss(slot);
-                continue;
-            }
-            const Vec3f direction = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
-            const SurfacePoint point = picture.camera.surface(stage.placements, hit, float(x) + 0.5f, float(y) + 0.5f,
-                                                              buffer.ids.depth(x, y), direction);
-            const Reach reach = flat ? Reach{} : filtered.reach(x, y);
-            buffer.light(x, y) = PixelLight(reach);
-            shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole), cell_rank(x, y)), hit, point, reach,
-                       pixel.has(Pixel::on_target));
+    if (!flat)
+        if (const Rect part = grainy(buffer, tile); !part.empty()) filter_tile(buffer, picture.view, part, filtered);
+    Shader shader(stage, todo.size(), false, rays);
+    for (std::uint32_t slot = 0; slot < todo.size(); ++slot) {
+        const auto [x, y] = todo[slot];
+        const Pixel& pixel = buffer.pixels(x, y);
+        const Hit hit = buffer.hit(x, y);
+        if (!hit.any()) {
+            shader.miss(slot);
+            continue;
         }
+        const Vec3f direction = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
+        const SurfacePoint point = picture.camera.surface(stage.placements, hit, float(x) + 0.5f, float(y) + 0.5f,
+                                                          buffer.ids.depth(x, y), direction);
+        const Reach reach = flat ? Reach{} : pixel.has(Pixel::inferred) ? pixel.reach() : filtered.reach(x, y);
+        buffer.light(x, y) = PixelLight(reach);
+        shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole), cell_rank(x, y)), hit, point, reach,
+                   pixel.has(Pixel::on_target));
+    }
     shader.finish();
-    for (int y = tile.y0; y < tile.y1; ++y)
-        for (int x = tile.x0; x < tile.x1; ++x) {
-            const Pixel& pixel = buffer.pixels(x, y);
-            if (!pixel.has(Pixel::traced)) continue;
-            const Vec4f c =
-                display_color(shader.radiance(std::uint32_t(filtered.index(x, y))), picture.params.background);
-            picture.color(x, y) = c;
-            picture.opened(x, y) = pixel.has(Pixel::in_hole) ? 1 : 0;
-        }
+    for (std::uint32_t slot = 0; slot < todo.size(); ++slot) {
+        const auto [x, y] = todo[slot];
+        picture.color(x, y) = display_color(shader.radiance(slot), picture.params.background);
+        picture.opened(x, y) = buffer.pixels(x, y).has(Pixel::in_hole) ? 1 : 0;
+    }
     picture.rays.add(rays);
 }
 

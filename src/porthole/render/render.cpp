@@ -1,9 +1,12 @@
 #include "porthole/render/render.h"
 
+#include <algorithm>
 #include <cassert>
 #include <new>
+#include <optional>
 #include <string>
 
+#include "porthole/render/adaptive.h"
 #include "porthole/render/emphasis.h"
 #include "porthole/render/linework.h"
 #include "porthole/render/picture.h"
@@ -39,6 +42,10 @@ public:
             if (control_.progress)
                 control_.progress("render", base_ + share * std::min(1.0, double(n) / double(tiles_)));
         });
+        pass(share);
+    }
+    /// Counts work that was done otherwise.
+    void pass(double share) {
         base_ += share;
         if (control_.progress) control_.progress("render", std::min(1.0, base_));
     }
@@ -62,15 +69,27 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     const Occlusion occlusion(bvh, cut, lighting, params);
     const std::vector<Placement> placements = make_placements(scene);
     Passes passes(picture.buffer.window(), control);
-    passes.run(0.5, [&](Rect tile) { gather_tile(picture, occlusion, placements, tile); });
-
     std::vector<Tint> tints;
-    if (targets) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
     const Stage stage{scene, bvh, cut, params, lighting, occlusion, placements, tints};
+    std::optional<BlockMap> map;
+    if (params.refine == Refine::adaptive) {
+        // Where more than colours is looked at, what each pixel sees is traced.
+        const bool everything = !cut && !targets && params.lines != Lines::all;
+        map = gather_adaptive(picture, stage, everything, control);
+        passes.pass(0.5);
+    } else {
+        passes.run(0.5, [&](Rect tile) { gather_tile(picture, occlusion, placements, tile); });
+    }
+    if (targets) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
     passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
+    if (map) passes.run(0, [&](Rect tile) { infer_colors(picture, *map, tile); });
     if (params.samples > 1) {
-        passes.run(0.02, [&](Rect tile) { find_edges(picture, tile); });
-        passes.run(0.23, [&](Rect tile) { refine_tile(picture, stage, tile); });
+        passes.run(0.02, [&](Rect tile) {
+            if (!map || map->is_busy(tile)) find_edges(picture, tile);
+        });
+        passes.run(0.23, [&](Rect tile) {
+            if (!map || map->is_busy(tile)) refine_tile(picture, stage, tile);
+        });
     }
     const bool has_rim = cut && params.lines != Lines::none && params.shading != Shading::flat && params.rim_px > 0;
     if (!has_rim && params.lines != Lines::all) return;
@@ -79,13 +98,24 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     passes.run(0.05, [&](Rect tile) { draw_lines(picture, stage, rim, tile); });
 }
 
+/// Which ids were not traced.
+void mark_inferred(const Picture& picture, Frame& frame) {
+    if (picture.params.refine != Refine::adaptive) return;
+    frame.inferred = Mask(frame.ids.window());
+    const std::vector<Pixel>& pixels = picture.buffer.pixels.pixels();
+    std::transform(pixels.begin(), pixels.end(), frame.inferred.pixels().begin(),
+                   [](const Pixel& p) { return std::uint8_t(p.flags == Pixel::inferred); });
+}
+
 Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* covering,
                  const Control& control) {
     const Camera camera(bvh, targets, view, nullptr);
     Picture picture(view, params, camera, view.window());
     mark_everything(picture, covering);
     draw(picture, bvh, targets, nullptr, nullptr, control);
-    return {std::move(picture.color), std::move(picture.buffer.ids), {}, {}, picture.rays.get()};
+    Frame frame{std::move(picture.color), std::move(picture.buffer.ids), {}, {}, picture.rays.get()};
+    mark_inferred(picture, frame);
+    return frame;
 }
 
 Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut& cut,

@@ -1,0 +1,590 @@
+#include "porthole/render/adaptive.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace porthole {
+
+namespace {
+
+// What may be inferred. Colours are encoded as files have them, so errors are as the eye sees them.
+constexpr float kColorError = 0.012f;   ///< estimated, half way between two traced blocks
+constexpr float kDepthError = 1.0f;     ///< the same, pixels
+constexpr float kAmbientStep = 0.12f;   ///< of the open share, from block to block
+constexpr float kLampStep = 0.02f;      ///< of the lamps' share
+constexpr float kSmooth = 0.9f;         ///< cosine between normals of one surface
+constexpr float kOneSurface = 0.8f;     ///< the same, farther apart
+constexpr float kOffPlane = 1.5f;       ///< pixels by which neighbours of one surface leave its plane
+constexpr float kLeastRoughness = 0.3f; ///< smoother materials may mirror what is around them
+constexpr std::size_t kSeeds = 32;      ///< vertices of a part that are looked for
+constexpr float kHidden = 0.999f;       ///< a vertex behind this share of its depth is hidden
+
+/// Whether colours of a material vary with nothing but geometry and light.
+bool is_plain(const Material& m) {
+    const auto bare = [](const TextureRef& t) { return t.texture < 0; };
+    return bare(m.base_color_texture) && bare(m.metallic_roughness_texture) && bare(m.normal_texture) &&
+           bare(m.emissive_texture) && bare(m.occlusion_texture) && bare(m.transmission_texture) &&
+           m.transmission == 0 && m.alpha_mode == AlphaMode::opaque && m.roughness >= kLeastRoughness;
+}
+
+/// Calls body(tile) for every tile of 64x64 pixels.
+template <typename Body> void for_tiles(const Picture& picture, const Control& control, Body&& body) {
+    parallel_for_tiles(picture.buffer.window(), FilteredTile::kSize, control, body);
+}
+
+Rect blocks_of(Rect tile) {
+    return {tile.x0 / kCell, tile.y0 / kCell, (tile.x1 - 1) / kCell + 1, (tile.y1 - 1) / kCell + 1};
+}
+
+float encoded(float v) { return std::sqrt(std::max(v, 0.0f)); }
+
+/// Error at the middle of a gap whose ends have values b and c, where the blocks beside it run
+/// from a to b and from c to d: a parabola's, by how far its slope turns.
+float middle_error(float a, float b, int ab, float c, float d, int cd, int gap) {
+    const float slope = (c - b) / float(gap);
+    const float before = ab > 0 ? (b - a) / float(ab) : slope, after = cd > 0 ? (d - c) / float(cd) : slope;
+    return 0.25f * float(gap) * std::max(std::abs(before - slope), std::abs(after - slope));
+}
+
+/// One picture being refined.
+class Refinement {
+public:
+    Refinement(Picture& picture, const Stage& stage, bool everything, const Control& control)
+        : picture_(picture), stage_(stage), everything_(everything), control_(control), map_(picture) {
+        for (const Material& m : stage.scene.materials) plain_.push_back(is_plain(m));
+    }
+
+    BlockMap run() {
+        trace_level(0);
+        decide_cells(0);
+        trace_level(1);
+        decide_cells(1);
+        settle_cells();
+        trace_level(2);
+        trace_blocks(seeds());
+        for (std::vector<Vec2i> fresh = traced_blocks(); !fresh.empty();) fresh = trace_blocks(contradicted_by(fresh));
+        take_light();
+        settle();
+        return std::move(map_);
+    }
+
+private:
+    void trace(std::span<const Vec2i> blocks, bool corners);
+    void summarise(int bx, int by, bool corners);
+    void color_corners(int bx, int by);
+    void trace_level(int level);
+    void decide_cells(int level);
+    [[nodiscard]] BlockMap::Cell agreement(Vec2i a, Vec2i b) const;
+    [[nodiscard]] bool is_straight(Vec2i a, Vec2i b) const;
+    [[nodiscard]] std::vector<Vec2i> seeds() const;
+    [[nodiscard]] std::vector<Vec2i> seeds_of(PartId part) const;
+    void settle_cells();
+    std::vector<Vec2i> trace_blocks(std::vector<Vec2i> blocks);
+    [[nodiscard]] std::vector<Vec2i> traced_blocks() const;
+    [[nodiscard]] std::vector<Vec2i> contradicted_by(std::span<const Vec2i> fresh) const;
+    [[nodiscard]] bool contradicts(Vec2i traced, Vec2i b) const;
+    void take_light();
+    bool light_fits(int bx, int by);
+    void settle();
+    void infer_surface(int bx, int by, bool light);
+    Picture& picture_;
+    const Stage& stage_;
+    bool everything_;
+    const Control& control_;
+    BlockMap map_;
+    std::vector<std::uint8_t> plain_; ///< by material
+};
+
+void Refinement::trace(std::span<const Vec2i> blocks, bool corners) {
+    if (blocks.empty()) return;
+    gather_blocks(picture_, stage_.occlusion, stage_.placements, blocks, true);
+    for (const Vec2i b : blocks) {
+        map_.state(b.x, b.y) = BlockMap::traced;
+        summarise(b.x, b.y, corners);
+    }
+}
+
+void Refinement::summarise(int bx, int by, bool corners) {
+    const GBuffer& buffer = picture_.buffer;
+    const Rect r = map_.pixels(bx, by);
+    BlockSummary s;
+    s.key = buffer.key(r.x0, r.y0);
+    s.uniform = s.evenly_lit = true;
+    const Pixel& first = buffer.pixels(r.x0, r.y0);
+    const auto material = [&](int x, int y) {
+        return stage_.scene.mesh_of(buffer.ids.id(x, y)).material_of(buffer.pixels(x, y).triangle);
+    };
+    float open = 0, all = 0, lamps[3] = {};
+    for (int y = r.y0; y < r.y1; ++y)
+        for (int x = r.x0; x < r.x1; ++x) {
+            const Pixel& p = buffer.pixels(x, y);
+            s.uniform = s.uniform && p.has(Pixel::traced) && buffer.key(x, y) == s.key;
+            if (!s.uniform) break;
+            open += float(p.ambient_open), all += float(p.ambient_all);
+            for (int c = 0; c < 3; ++c) {
+                lamps[c] += float(p.lamps[c]);
+                s.evenly_lit = s.evenly_lit && p.lamps[c] == first.lamps[c];
+            }
+        }
+    if (s.uniform && s.key != GBuffer::kNoKey) {
+        const float n = float(r.width() * r.height());
+        s.open = open / n, s.all = all / n;
+        for (int c = 0; c < 3; ++c) s.lamps[c] = lamps[c] / n;
+        s.material = material(r.x0, r.y0);
+        const Vec3f normal = unpack_normal(first.normal);
+        for (int y = r.y0; y < r.y1; ++y)
+            for (int x = r.x0; x < r.x1; ++x)
+                s.uniform = s.uniform && material(x, y) == s.material &&
+                            dot(unpack_normal(buffer.pixels(x, y).normal), normal) >= kSmooth;
+        s.interpolable =
+            everything_ && plain_[s.material] != 0 && stage_.scene.mesh_of(buffer.ids.id(r.x0, r.y0)).colors.empty();
+    }
+    map_.summary(bx, by) = s;
+    if (corners && s.uniform && s.interpolable) color_corners(bx, by);
+}
+
+/// What the corners of an evenly lit block will look like, near enough to decide by.
+void Refinement::color_corners(int bx, int by) {
+    const BlockSummary& s = map_.summary(bx, by);
+    const Rect r = map_.pixels(bx, by);
+    const Reach reach{{s.lamps[0] / 255.0f, s.lamps[1] / 255.0f, s.lamps[2] / 255.0f}, s.ambient()};
+    for (const int y : {r.y0, r.y1 - 1})
+        for (const int x : {r.x0, r.x1 - 1}) {
+            const Hit hit = picture_.buffer.hit(x, y);
+            const Vec3f direction = picture_.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
+            const SurfacePoint point = picture_.camera.surface(stage_.placements, hit, float(x) + 0.5f, float(y) + 0.5f,
+                                                               picture_.buffer.ids.depth(x, y), direction);
+            const Substance substance = porthole::substance(stage_.scene, stage_.placements[index(hit.part)], hit);
+            Radiance radiance;
+            if (picture_.params.shading == Shading::flat) {
+                radiance.shown = shade_flat(substance, point.normal, -direction);
+            } else {
+                const Shaded shaded = shade(stage_.lighting, point, point.normal, -direction, substance, reach, true);
+                radiance.light = shaded.light, radiance.shown = shaded.shown;
+            }
+            picture_.color(x, y) = display_color(radiance, picture_.params.background);
+        }
+}
+
+void Refinement::trace_level(int level) {
+    for_tiles(picture_, control_, [&](Rect tile) {
+        std::vector<Vec2i> todo;
+        const Rect blocks = blocks_of(tile);
+        for (int by = blocks.y0; by < blocks.y1; ++by)
+            for (int bx = blocks.x0; bx < blocks.x1; ++bx) {
+                if (map_.state(bx, by) != BlockMap::wanted) continue;
+                if (level < LatticeAxis::kLevels &&
+                    !(map_.columns.on_lattice(level, bx) && map_.rows.on_lattice(level, by)))
+                    continue;
+                if (level == 1 && map_.allowed(0, bx, by) != BlockMap::differs) continue;
+                if (level == 2 && map_.allows(bx, by) != BlockMap::differs) continue;
+                todo.push_back({bx, by});
+            }
+        trace(todo, level < LatticeAxis::kLevels);
+    });
+}
+
+void Refinement::decide_cells(int level) {
+    Mask& cells = map_.cells[level];
+    parallel_for(std::size_t(cells.height()), control_, [&](std::size_t row) {
+        const int cy = int(row);
+        const auto [top, bottom] = map_.rows.cell(level, cy);
+        for (int cx = 0; cx < cells.width(); ++cx) {
+            if (level > 0) {
+                const std::uint8_t parent = map_.cells[0](map_.columns.parent(cx), map_.rows.parent(cy));
+                if (parent != BlockMap::differs) {
+                    cells(cx, cy) = parent;
+                    continue;
+                }
+            }
+            const auto [left, right] = map_.columns.cell(level, cx);
+            const Vec2i a{left, top}, b{right, top}, c{left, bottom}, d{right, bottom};
+            cells(cx, cy) = std::min({agreement(a, b), agreement(c, d), agreement(a, c), agreement(b, d)});
+        }
+    });
+}
+
+/// Which lattice the blocks that are not traced yet follow from, and how far.
+void Refinement::settle_cells() {
+    const Rect area = map_.area();
+    parallel_for(std::size_t(area.height()), control_, [&](std::size_t row) {
+        const int by = area.y0 + int(row);
+        for (int bx = area.x0; bx < area.x1; ++bx) {
+            if (map_.state(bx, by) != BlockMap::wanted) continue;
+            for (int level = 0; level < LatticeAxis::kLevels; ++level) {
+                const BlockMap::Cell cell = map_.allowed(level, bx, by);
+                if (cell == BlockMap::differs) continue;
+                map_.level(bx, by) = std::uint8_t(level);
+                map_.allows(bx, by) = cell;
+                break;
+            }
+        }
+    });
+}
+
+BlockMap::Cell Refinement::agreement(Vec2i a, Vec2i b) const {
+    if (!map_.is_traced(a.x, a.y) || !map_.is_traced(b.x, b.y)) return BlockMap::differs;
+    const BlockSummary &sa = map_.summary(a.x, a.y), &sb = map_.summary(b.x, b.y);
+    if (!sa.uniform || !sb.uniform || sa.key != sb.key || sa.material != sb.material) return BlockMap::differs;
+    if (sa.key == GBuffer::kNoKey) return everything_ ? BlockMap::one_color : BlockMap::one_light;
+    if (!sa.evenly_lit || !sb.evenly_lit || std::abs(sa.ambient() - sb.ambient()) > kAmbientStep)
+        return BlockMap::differs;
+    for (int c = 0; c < 3; ++c)
+        if (std::abs(sa.lamps[c] - sb.lamps[c]) > 255.0f * kLampStep) return BlockMap::differs;
+    return sa.interpolable && is_straight(a, b) ? BlockMap::one_color : BlockMap::one_light;
+}
+
+/// Whether colour and depth run so straight from block to block that what lies between can be
+/// interpolated.
+bool Refinement::is_straight(Vec2i a, Vec2i b) const {
+    const Rect ra = map_.pixels(a.x, a.y), rb = map_.pixels(b.x, b.y);
+    const bool across = a.y == b.y;
+    const int gap = across ? rb.x0 - (ra.x1 - 1) : rb.y0 - (ra.y1 - 1);
+    if (gap <= 1) return true;
+    const auto line = [&](int i) -> std::array<Vec2i, 4> {
+        if (across) {
+            const int y = i == 0 ? ra.y0 : ra.y1 - 1;
+            return {Vec2i{ra.x0, y}, {ra.x1 - 1, y}, {rb.x0, y}, {rb.x1 - 1, y}};
+        }
+        const int x = i == 0 ? ra.x0 : ra.x1 - 1;
+        return {Vec2i{x, ra.y0}, {x, ra.y1 - 1}, {x, rb.y0}, {x, rb.y1 - 1}};
+    };
+    const int in_a = across ? ra.width() - 1 : ra.height() - 1, in_b = across ? rb.width() - 1 : rb.height() - 1;
+    const IdBuffer& ids = picture_.buffer.ids;
+    const bool parallel = picture_.view.orthographic;
+    for (const int i : {0, 1}) {
+        const std::array<Vec2i, 4> p = line(i);
+        const Vec3f na = unpack_normal(picture_.buffer.pixels(p[1].x, p[1].y).normal);
+        const Vec3f nb = unpack_normal(picture_.buffer.pixels(p[2].x, p[2].y).normal);
+        if (dot(na, nb) < kSmooth) return false;
+        const auto error = [&](auto&& value) {
+            return middle_error(value(p[0]), value(p[1]), in_a, value(p[2]), value(p[3]), in_b, gap);
+        };
+        // On a plane it is the reciprocal that runs straight, but for parallel rays.
+        const float z = ids.depth(p[1].x, p[1].y);
+        const float bend = error([&](Vec2i q) { return parallel ? ids.depth(q.x, q.y) : z / ids.depth(q.x, q.y); });
+        if (!(bend * (parallel ? 1.0f : z) <= kDepthError * picture_.view.pixel_size(z))) return false;
+        const auto color = [&](Vec2i q) { return picture_.color(q.x, q.y); };
+        if (!(error([&](Vec2i q) { return encoded(color(q).x); }) <= kColorError)) return false;
+        if (!(error([&](Vec2i q) { return encoded(color(q).y); }) <= kColorError)) return false;
+        if (!(error([&](Vec2i q) { return encoded(color(q).z); }) <= kColorError)) return false;
+    }
+    return true;
+}
+
+std::vector<Vec2i> Refinement::seeds_of(PartId id) const {
+    const Scene& scene = stage_.scene;
+    const Part& part = scene.parts[index(id)];
+    const Mesh& mesh = scene.meshes[part.mesh];
+    const Affine3f place(part.world_from_mesh);
+    std::vector<Vec2i> found;
+    const auto look = [&](Vec3f point) {
+        const PixelPoint p = picture_.view.project(place.point(point));
+        if (!(p.depth > 0) || !(p.x >= float(map_.window.x0)) || !(p.x < float(map_.window.x1)) ||
+            !(p.y >= float(map_.window.y0)) || !(p.y < float(map_.window.y1)))
+            return;
+        const int x = int(p.x), y = int(p.y), bx = x / kCell, by = y / kCell;
+        if (map_.state(bx, by) != BlockMap::wanted) return;
+        const Between at = Surrounding(map_, bx, by).at(x, y);
+        const IdBuffer& ids = picture_.buffer.ids;
+        if (ids.id(at.left, at.top) == id) return;
+        if (at.mix_of([&](int cx, int cy) { return ids.depth(cx, cy); }) < kHidden * p.depth) return;
+        found.push_back({bx, by});
+    };
+    const std::size_t n = mesh.positions.size();
+    for (std::size_t k = 0; k < std::min(n, kSeeds); ++k) look(mesh.positions[k * n / std::min(n, kSeeds)]);
+    if (n == 0)
+        for (int k = 0; k < 8; ++k) look(mesh.bounds.corner(k));
+    return found;
+}
+
+std::vector<Vec2i> Refinement::seeds() const {
+    std::vector<PartId> parts;
+    for (const PartId id : all_parts(stage_.scene))
+        if (stage_.bvh.holds(id)) parts.push_back(id);
+    constexpr std::size_t kRun = 64;
+    std::vector<std::vector<Vec2i>> runs((parts.size() + kRun - 1) / kRun);
+    parallel_for(runs.size(), control_, [&](std::size_t r) {
+        for (std::size_t i = r * kRun; i < std::min(parts.size(), (r + 1) * kRun); ++i) {
+            const std::vector<Vec2i> found = seeds_of(parts[i]);
+            runs[r].insert(runs[r].end(), found.begin(), found.end());
+        }
+    });
+    std::vector<Vec2i> all;
+    for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
+    return all;
+}
+
+/// Traces blocks, each once. @return them.
+std::vector<Vec2i> Refinement::trace_blocks(std::vector<Vec2i> blocks) {
+    constexpr int kTileBlocks = FilteredTile::kSize / kCell;
+    const auto key = [](Vec2i b) { return std::array<int, 4>{b.y / kTileBlocks, b.x / kTileBlocks, b.y, b.x}; };
+    std::sort(blocks.begin(), blocks.end(), [&](Vec2i a, Vec2i b) { return key(a) < key(b); });
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+    constexpr std::size_t kRun = 64;
+    parallel_for((blocks.size() + kRun - 1) / kRun, control_, [&](std::size_t run) {
+        trace(std::span(blocks).subspan(run * kRun, std::min(kRun, blocks.size() - run * kRun)), false);
+    });
+    return blocks;
+}
+
+std::vector<Vec2i> Refinement::traced_blocks() const {
+    std::vector<Vec2i> blocks;
+    const Rect area = map_.area();
+    for (int by = area.y0; by < area.y1; ++by)
+        for (int bx = area.x0; bx < area.x1; ++bx)
+            if (map_.state(bx, by) == BlockMap::traced) blocks.push_back({bx, by});
+    return blocks;
+}
+
+/// Neighbours of `fresh` blocks that have to be traced as well.
+std::vector<Vec2i> Refinement::contradicted_by(std::span<const Vec2i> fresh) const {
+    constexpr std::size_t kRun = 256;
+    std::vector<std::vector<Vec2i>> runs((fresh.size() + kRun - 1) / kRun);
+    parallel_for(runs.size(), control_, [&](std::size_t r) {
+        for (std::size_t i = r * kRun; i < std::min(fresh.size(), (r + 1) * kRun); ++i)
+            for (const Vec2i d : {Vec2i{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+                const Vec2i b{fresh[i].x + d.x, fresh[i].y + d.y};
+                if (map_.state.at_or(b.x, b.y, BlockMap::unused) == BlockMap::wanted && contradicts(fresh[i], b))
+                    runs[r].push_back(b);
+            }
+    });
+    std::vector<Vec2i> all;
+    for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
+    return all;
+}
+
+/// Whether a traced block shows that something else than what follows from the lattice goes on in
+/// its neighbour `b`.
+bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
+    const Surrounding around(map_, b.x, b.y);
+    if (std::find(std::begin(around.block), std::end(around.block), traced) != std::end(around.block)) return false;
+    const GBuffer& buffer = picture_.buffer;
+    const Rect t = map_.pixels(traced.x, traced.y), r = map_.pixels(b.x, b.y);
+    const int dx = b.x - traced.x, dy = b.y - traced.y;
+    const BlockSummary& here = map_.summary(traced.x, traced.y);
+    const std::uint32_t key = map_.summary(around.block[0].x, around.block[0].y).key;
+    if (here.uniform && here.key == key && key != GBuffer::kNoKey) {
+        const Between at = around.at(r.x0, r.y0);
+        const float ambient = around.mix_of(map_, at, [](const BlockSummary& s) { return s.ambient(); });
+        if (std::abs(here.ambient() - ambient) > 2 * kAmbientStep) return true;
+        for (int c = 0; c < 3; ++c) {
+            const float lamp = around.mix_of(map_, at, [c](const BlockSummary& s) { return s.lamps[c]; });
+            if (std::abs(here.lamps[c] - lamp) > 255.0f * 2 * kLampStep) return true;
+        }
+    }
+    if (map_.allows(b.x, b.y) != BlockMap::one_color) return false;
+    const int n = dx != 0 ? std::min(t.height(), r.height()) : std::min(t.width(), r.width());
+    const auto border = [](int d, int low, int high) { return d > 0 ? high - 1 : low; };
+    for (int i = 0; i < n; ++i) {
+        const Vec2i p{dx != 0 ? border(dx, t.x0, t.x1) : t.x0 + i, dy != 0 ? border(dy, t.y0, t.y1) : t.y0 + i};
+        if (buffer.key(p.x, p.y) != key) return true;
+        if (key == GBuffer::kNoKey) continue;
+        const Vec2i q{p.x + dx, p.y + dy};
+        const Between at = around.at(q.x, q.y);
+        const float depth = 1.0f / at.mix_of([&](int x, int y) { return 1.0f / buffer.ids.depth(x, y); });
+        const auto position = [&](Vec2i pixel, float z) {
+            const Ray ray = picture_.view.ray(float(pixel.x) + 0.5f, float(pixel.y) + 0.5f);
+            return ray.origin + ray.direction * (z / ray.depth_per_t);
+        };
+        const Vec3f step = position(q, depth) - position(p, buffer.ids.depth(p.x, p.y));
+        const Vec3f normal = unpack_normal(buffer.pixels(p.x, p.y).normal);
+        if (std::abs(dot(step, normal)) > kOffPlane * picture_.view.pixel_size(depth)) return true;
+        const Pixel& nearest = buffer.pixels(at.tx < 0.5f ? at.left : at.right, at.ty < 0.5f ? at.top : at.bottom);
+        if (dot(normal, unpack_normal(nearest.normal)) < kOneSurface) return true;
+    }
+    return false;
+}
+
+/// Camera rays of the blocks whose light alone is inferred; light too where it does not fit.
+void Refinement::take_light() {
+    for_tiles(picture_, control_, [&](Rect tile) {
+        std::vector<Vec2i> todo, misfits;
+        const Rect area = blocks_of(tile);
+        for (int by = area.y0; by < area.y1; ++by)
+            for (int bx = area.x0; bx < area.x1; ++bx)
+                if (map_.state(bx, by) == BlockMap::wanted && map_.allows(bx, by) == BlockMap::one_light)
+                    todo.push_back({bx, by});
+        gather_blocks(picture_, stage_.occlusion, stage_.placements, todo, false);
+        for (const Vec2i b : todo)
+            if (!light_fits(b.x, b.y)) misfits.push_back(b);
+        // State and summary of blocks are not written here: other tiles still look at them.
+        gather_blocks(picture_, stage_.occlusion, stage_.placements, misfits, true);
+    });
+}
+
+/// Whether the pixels of a block see the surface that the lattice's corners see; if so they
+/// take their light.
+bool Refinement::light_fits(int bx, int by) {
+    GBuffer& buffer = picture_.buffer;
+    const Rect r = map_.pixels(bx, by);
+    const Surrounding around(map_, bx, by);
+    for (int y = r.y0; y < r.y1; ++y)
+        for (int x = r.x0; x < r.x1; ++x) {
+            const Between at = around.at(x, y);
+            const std::uint32_t key = buffer.key(at.left, at.top);
+            const Pixel& p = buffer.pixels(x, y);
+            if (!p.has(Pixel::traced) || buffer.key(x, y) != key) return false;
+            if (key == GBuffer::kNoKey) continue;
+            const Vec3f normal = unpack_normal(p.normal);
+            const auto off = [&](int cx, int cy) {
+                const Pixel& corner = buffer.pixels(cx, cy);
+                return dot(unpack_normal(corner.normal), normal) < kSmooth;
+            };
+            if (off(at.left, at.top) || off(at.right, at.top) || off(at.left, at.bottom) || off(at.right, at.bottom))
+                return false;
+        }
+    for (int y = r.y0; y < r.y1; ++y)
+        for (int x = r.x0; x < r.x1; ++x) buffer.pixels(x, y).flags |= Pixel::inferred;
+    infer_surface(bx, by, true);
+    return true;
+}
+
+/// What pixels of a block take from the lattice: their surface unless it is traced, and their light.
+void Refinement::infer_surface(int bx, int by, bool light) {
+    GBuffer& buffer = picture_.buffer;
+    const Rect r = map_.pixels(bx, by);
+    const Surrounding around(map_, bx, by);
+    const PartId id = buffer.ids.id(around.at(r.x0, r.y0).left, around.at(r.x0, r.y0).top);
+    const bool surface = map_.allows(bx, by) == BlockMap::one_color;
+    const bool parallel = picture_.view.orthographic;
+    for (int y = r.y0; y < r.y1; ++y)
+        for (int x = r.x0; x < r.x1; ++x) {
+            if (surface) {
+                buffer.pixels(x, y).flags = Pixel::inferred;
+                buffer.ids.id(x, y) = id;
+            }
+            if (id == kNoPart) continue;
+            const Between at = around.at(x, y);
+            if (surface) {
+                const float d = at.mix_of([&](int cx, int cy) {
+                    return parallel ? buffer.ids.depth(cx, cy) : 1.0f / buffer.ids.depth(cx, cy);
+                });
+                buffer.ids.depth(x, y) = parallel ? d : 1.0f / d;
+            }
+            if (!light) continue;
+            Pixel& p = buffer.pixels(x, y);
+            const auto normal = [&](int cx, int cy) { return unpack_normal(buffer.pixels(cx, cy).normal); };
+            if (surface) p.normal = pack_normal(normalize(at.mix_of(normal), normal(at.left, at.top)));
+            const auto rounded = [&](auto&& value) { return std::lround(around.mix_of(map_, at, value)); };
+            p.ambient_open = std::uint16_t(rounded([](const BlockSummary& s) { return s.open; }));
+            p.ambient_all = std::uint16_t(rounded([](const BlockSummary& s) { return s.all; }));
+            for (int c = 0; c < 3; ++c)
+                p.lamps[c] = std::uint8_t(rounded([c](const BlockSummary& s) { return s.lamps[c]; }));
+            buffer.light(x, y) = PixelLight(p.reach());
+        }
+}
+
+/// Traced blocks that stand alone on a smooth surface take the mean of their own light, so that
+/// it has no grain; blocks that are inferred get their surface, and light if anyone looks for it.
+void Refinement::settle() {
+    const Rect area = map_.area();
+    const auto any_around = [&](int bx, int by, auto&& is) {
+        for (int y = std::max(by - 1, area.y0); y < std::min(by + 2, area.y1); ++y)
+            for (int x = std::max(bx - 1, area.x0); x < std::min(bx + 2, area.x1); ++x)
+                if (is(x, y)) return true;
+        return false;
+    };
+    const auto for_blocks = [&](auto&& body) {
+        for_tiles(picture_, control_, [&](Rect tile) {
+            const Rect blocks = blocks_of(tile);
+            for (int by = blocks.y0; by < blocks.y1; ++by)
+                for (int bx = blocks.x0; bx < blocks.x1; ++bx) body(bx, by);
+        });
+    };
+    Mask alone(area);
+    for_blocks([&](int bx, int by) {
+        if (!map_.is_traced(bx, by)) return;
+        const BlockSummary& s = map_.summary(bx, by);
+        if (!s.uniform || !s.evenly_lit) return;
+        if (!any_around(bx, by, [&](int x, int y) { return map_.state(x, y) == BlockMap::wanted; })) return;
+        alone(bx, by) = 1;
+        const Rect r = map_.pixels(bx, by);
+        for (int y = r.y0; y < r.y1; ++y)
+            for (int x = r.x0; x < r.x1; ++x) {
+                Pixel& p = picture_.buffer.pixels(x, y);
+                p.flags |= Pixel::inferred;
+                p.ambient_open = std::uint16_t(std::lround(s.open));
+                p.ambient_all = std::uint16_t(std::lround(s.all));
+            }
+    });
+    for_blocks([&](int bx, int by) {
+        if (alone(bx, by)) map_.state(bx, by) = BlockMap::settled;
+    });
+    for_blocks([&](int bx, int by) {
+        if (!map_.is_inferred(bx, by)) return;
+        infer_surface(bx, by, any_around(bx, by, [&](int x, int y) {
+                          return map_.state(x, y) == BlockMap::traced ||
+                                 (map_.state(x, y) == BlockMap::wanted && !map_.is_inferred(x, y));
+                      }));
+    });
+}
+
+} // namespace
+
+BlockMap::BlockMap(const Picture& picture)
+    : window(picture.buffer.window()), columns(window.x0 / kCell, (window.x1 - 1) / kCell),
+      rows(window.y0 / kCell, (window.y1 - 1) / kCell),
+      state(Rect{window.x0 / kCell, window.y0 / kCell, (window.x1 - 1) / kCell + 1, (window.y1 - 1) / kCell + 1}),
+      allows(state.window(), differs), level(state.window()), summary(state.window()) {
+    for (int lattice = 0; lattice < LatticeAxis::kLevels; ++lattice)
+        cells[lattice] = Mask(columns.cells(lattice), rows.cells(lattice), differs);
+    const Rect a = area();
+    for (int by = a.y0; by < a.y1; ++by)
+        for (int bx = a.x0; bx < a.x1; ++bx) {
+            const Rect r = pixels(bx, by);
+            for (int y = r.y0; y < r.y1; ++y)
+                for (int x = r.x0; x < r.x1; ++x)
+                    if (picture.buffer.pixels(x, y).has(Pixel::traced) || picture.covered.at_or(x, y, 0))
+                        state(bx, by) = wanted;
+        }
+}
+
+BlockMap::Cell BlockMap::allowed(int lattice, int bx, int by) const {
+    const LatticeAxis::Place x = columns.place(lattice, bx), y = rows.place(lattice, by);
+    std::uint8_t least = one_color;
+    for (int cy = y.cell_low; cy <= y.cell_high; ++cy)
+        for (int cx = x.cell_low; cx <= x.cell_high; ++cx) least = std::min(least, cells[lattice](cx, cy));
+    return Cell(least);
+}
+
+bool BlockMap::is_busy(Rect tile) const {
+    const Rect blocks = blocks_of(tile).grown(1).intersected(area());
+    for (int by = blocks.y0; by < blocks.y1; ++by)
+        for (int bx = blocks.x0; bx < blocks.x1; ++bx)
+            if (state(bx, by) == traced || (state(bx, by) == wanted && allows(bx, by) == one_light)) return true;
+    return false;
+}
+
+Surrounding::Surrounding(const BlockMap& map, int bx, int by) {
+    const int lattice = map.level(bx, by);
+    const LatticeAxis::Place column = map.columns.place(lattice, bx), row = map.rows.place(lattice, by);
+    block[0] = {column.low, row.low}, block[1] = {column.high, row.low};
+    block[2] = {column.low, row.high}, block[3] = {column.high, row.high};
+    between_columns = column.low != column.high, between_rows = row.low != row.high;
+    left = (column.low + 1) * kCell - 1, right = column.high * kCell;
+    top = (row.low + 1) * kCell - 1, bottom = row.high * kCell;
+    // Blocks that another one follows are whole, but for the first ones' missing left and upper pixels.
+    x_step = 1.0f / float(std::max(1, right - left)), y_step = 1.0f / float(std::max(1, bottom - top));
+}
+
+BlockMap gather_adaptive(Picture& picture, const Stage& stage, bool everything, const Control& control) {
+    return Refinement(picture, stage, everything, control).run();
+}
+
+void infer_colors(Picture& picture, const BlockMap& map, Rect tile) {
+    const Rect area = blocks_of(tile);
+    for (int by = area.y0; by < area.y1; ++by)
+        for (int bx = area.x0; bx < area.x1; ++bx) {
+            if (!map.is_inferred(bx, by)) continue;
+            const Rect r = map.pixels(bx, by);
+            const Surrounding around(map, bx, by);
+            if (map.summary(around.block[0].x, around.block[0].y).key == GBuffer::kNoKey) continue; // as it is
+            for (int y = r.y0; y < r.y1; ++y)
+                for (int x = r.x0; x < r.x1; ++x)
+                    picture.color(x, y) = around.at(x, y).mix_of([&](int cx, int cy) { return picture.color(cx, cy); });
+        }
+}
+
+} // namespace porthole

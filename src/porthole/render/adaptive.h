@@ -1,0 +1,116 @@
+// Adaptive refinement: which blocks of 4x4 pixels are traced, and what the others take from
+// those around.
+//
+// Blocks on a lattice of 16 pixels are traced first. Where the four at the corners of a cell see
+// one surface in one light, what lies between is inferred; elsewhere the lattice is halved, then
+// every block is traced. At last each traced block that contradicts what was inferred beside it
+// has that neighbour traced as well, and so on: the paper's contour following, lifted from pixels
+// to blocks. The set of traced blocks is the least that this closure allows, so it does not
+// depend on the order of work.
+#pragma once
+
+#include "porthole/render/lattice.h"
+#include "porthole/render/picture.h"
+
+namespace porthole {
+
+/// What is known of a block once it is traced.
+struct BlockSummary {
+    std::uint32_t key = GBuffer::kNoKey; ///< of all its pixels, if uniform
+    std::uint32_t material = 0;
+    float open = 0, all = 0;   ///< mean over its pixels of what their ambient rays found
+    float lamps[3] = {};       ///< mean
+    bool uniform = false;      ///< one key and material, and no crease
+    bool evenly_lit = false;   ///< by the lamps
+    bool interpolable = false; ///< colours of its material follow from geometry and light alone
+    [[nodiscard]] float ambient() const { return all > 0 ? open / all : 1.0f; }
+};
+
+/// A picture's blocks of 4x4 pixels and what becomes of them; blocks in units of 4 pixels.
+struct BlockMap {
+    enum State : std::uint8_t {
+        unused,  ///< no pixel is wanted
+        wanted,  ///< not traced: what it shows follows from the lattice
+        traced,  ///< camera, shadow and ambient rays
+        settled, ///< traced, and so much alone on a smooth surface that its light is one value
+    };
+    /// What the four corners of a lattice cell allow between them.
+    enum Cell : std::uint8_t {
+        differs,   ///< nothing
+        one_light, ///< to infer the light
+        one_color  ///< to infer everything
+    };
+    Rect window; ///< of the picture, pixels
+    LatticeAxis columns, rows;
+    Mask state;
+    Mask allows;                 ///< Cell of blocks that are not traced,
+    Mask level;                  ///< and the lattice they follow from
+    Image<BlockSummary> summary; ///< of traced blocks
+    Mask cells[LatticeAxis::kLevels];
+
+    explicit BlockMap(const Picture& picture);
+    [[nodiscard]] Rect area() const { return state.window(); }
+    [[nodiscard]] Rect pixels(int bx, int by) const {
+        return Rect{bx * kCell, by * kCell, (bx + 1) * kCell, (by + 1) * kCell}.intersected(window);
+    }
+    [[nodiscard]] bool is_traced(int bx, int by) const { return state.at_or(bx, by, unused) >= traced; }
+    [[nodiscard]] bool is_inferred(int bx, int by) const {
+        return state(bx, by) == wanted && allows(bx, by) == one_color;
+    }
+    /// Least of what the level's cells around a block allow.
+    [[nodiscard]] Cell allowed(int lattice, int bx, int by) const;
+    /// Whether some block in or beside `tile` may see edges.
+    [[nodiscard]] bool is_busy(Rect tile) const;
+};
+
+/// From which traced pixels a pixel of a block takes what it shows: the weights tx and ty are of
+/// the right and lower ones.
+struct Between {
+    int left, right, top, bottom;
+    float tx, ty;
+    template <typename T> [[nodiscard]] T mix(T a, T b, T c, T d) const {
+        const T upper = a + (b - a) * tx, lower = c + (d - c) * tx;
+        return upper + (lower - upper) * ty;
+    }
+    /// Of what value(x, y) gives at the four pixels.
+    template <typename Value> [[nodiscard]] auto mix_of(Value&& value) const {
+        return mix(value(left, top), value(right, top), value(left, bottom), value(right, bottom));
+    }
+};
+
+/// Between which blocks of the lattice a block lies.
+struct Surrounding {
+    Vec2i block[4]; ///< upper left, upper right, lower left, lower right
+    bool between_columns, between_rows;
+    int left, right, top, bottom; ///< pixels nearest to it of the blocks around it
+    float x_step, y_step;
+
+    Surrounding(const BlockMap& map, int bx, int by);
+    [[nodiscard]] Between at(int x, int y) const {
+        return {between_columns ? left : x,
+                between_columns ? right : x,
+                between_rows ? top : y,
+                between_rows ? bottom : y,
+                between_columns ? float(x - left) * x_step : 0.0f,
+                between_rows ? float(y - top) * y_step : 0.0f};
+    }
+    /// Of what value(summary) gives of the four blocks.
+    template <typename Value> [[nodiscard]] float mix_of(const BlockMap& map, const Between& at, Value&& value) const {
+        const auto of = [&](int i) { return float(value(map.summary(block[i].x, block[i].y))); };
+        return at.mix(of(0), of(1), of(2), of(3));
+    }
+};
+
+/// Pass 1 in place of gather_tile() for every tile: traces what has to be. Afterwards pixels of
+/// blocks that are not traced have Pixel::inferred; without Pixel::traced if all of them is inferred: their
+/// surface is in the ids, their light where traced pixels beside them look for it, and their
+/// colour comes with infer_colors().
+/// @param everything  false: camera rays are traced everywhere, only light is inferred.
+/// Cost: 1/16 of gathering every block where nothing differs.
+/// The same bits for any number of threads.
+[[nodiscard]] BlockMap gather_adaptive(Picture& picture, const Stage& stage, bool everything, const Control& control);
+
+/// Colours of the pixels of `tile` that are inferred altogether, once those of traced ones are there.
+void infer_colors(Picture& picture, const BlockMap& map, Rect tile);
+
+} // namespace porthole

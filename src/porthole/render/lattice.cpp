@@ -1,0 +1,45 @@
+#include "porthole/render/lattice.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace porthole {
+
+LatticeAxis::LatticeAxis(int first, int last) : first_(first) {
+    assert(first <= last);
+    std::vector<int>& coarse = blocks_[0];
+    coarse.push_back(first);
+    for (int b = (first & ~3) + 4; b < last; b += 4) coarse.push_back(b);
+    if (last > first) coarse.push_back(last);
+    std::vector<int>& fine = blocks_[1];
+    for (std::size_t k = 0; k < coarse.size(); ++k) {
+        fine.push_back(coarse[k]);
+        if (k + 1 < coarse.size() && coarse[k + 1] - coarse[k] > 2) fine.push_back(coarse[k] + 2);
+    }
+    for (int level = 0; level < kLevels; ++level) {
+        int k = 0;
+        for (int b = first; b <= last; ++b) {
+            if (k + 1 < int(blocks_[level].size()) && blocks_[level][std::size_t(k + 1)] == b) ++k;
+            below_[level].push_back(k);
+        }
+    }
+}
+
+int LatticeAxis::cells(int level) const { return std::max(1, int(blocks_[level].size()) - 1); }
+
+std::pair<int, int> LatticeAxis::cell(int level, int index) const {
+    const std::vector<int>& b = blocks_[level];
+    return {b[std::size_t(index)], b[std::min(std::size_t(index) + 1, b.size() - 1)]};
+}
+
+LatticeAxis::Place LatticeAxis::place(int level, int block) const {
+    const std::vector<int>& b = blocks_[level];
+    const int k = below_[level][std::size_t(block - first_)], last = cells(level) - 1;
+    const int low = b[std::size_t(k)];
+    if (low == block) return {low, low, std::clamp(k - 1, 0, last), std::min(k, last)};
+    return {low, b[std::size_t(k + 1)], k, k};
+}
+
+int LatticeAxis::parent(int cell) const { return place(0, blocks_[1][std::size_t(cell)]).cell_high; }
+
+} // namespace porthole

@@ -1,0 +1,37 @@
+// Where blocks of 4x4 pixels lie in the nested lattices of adaptive refinement.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+namespace porthole {
+
+/// One axis of the lattices: level 0 has every fourth block, level 1 every second, and both the
+/// first and the last one. Blocks are numbered as in the picture: pixel / 4.
+class LatticeAxis {
+public:
+    static constexpr int kLevels = 2;
+
+    /// Blocks first..last, both included.
+    LatticeAxis(int first, int last);
+
+    /// A block between the lattice's blocks `low` and `high`, which are the block itself if it is
+    /// one of them; the cells that touch it are cell_low..cell_high.
+    struct Place {
+        int low, high;
+        int cell_low, cell_high;
+    };
+    [[nodiscard]] Place place(int level, int block) const;
+    [[nodiscard]] bool on_lattice(int level, int block) const { return place(level, block).low == block; }
+    /// Cells lie between neighbouring lattice blocks; there is at least one.
+    [[nodiscard]] int cells(int level) const;
+    [[nodiscard]] std::pair<int, int> cell(int level, int index) const; ///< its first and last block
+    [[nodiscard]] int parent(int cell) const;                           ///< the level-0 cell that holds a level-1 one
+
+private:
+    int first_;
+    std::vector<int> blocks_[kLevels]; ///< of the lattice, increasing
+    std::vector<int> below_[kLevels];  ///< by block: index of the last lattice block not beyond it
+};
+
+} // namespace porthole
