@@ -98,7 +98,7 @@ int run_check(const CheckOptions& options, Output& out, const Control& control) 
     params.max_bytes = most;
     std::vector<Difference> files;
     if (!reported.model.sha256.empty()) {
-        const std::string found = sha256(FileBytes{fs::path(common.model)}.bytes());
+        const std::string found = digest_file(fs::path(common.model), control.stop).sha256;
         if (found != reported.model.sha256)
             files.push_back({"model", common.model, "sha256 " + reported.model.sha256, found});
     }
@@ -110,8 +110,8 @@ int run_check(const CheckOptions& options, Output& out, const Control& control) 
                          "not the file that the report names, byte for byte; its pixels are compared"});
         params.picture = &pixels;
         params.lossy = is_jpeg(picture.output);
-        params.as_in_file = [&picture](const Frame& frame) {
-            return decode_values(encode_picture(frame, picture), picture.output);
+        params.as_in_file = [&picture, &control](const Frame& frame) {
+            return decode_values(encode_picture(frame, picture, control), picture.output);
         };
     }
 

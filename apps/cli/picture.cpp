@@ -80,18 +80,18 @@ void check_outputs(const PictureOptions& options, std::uint64_t max_memory) {
     check_writable(options.report_path, options.no_clobber);
 }
 
-std::vector<std::byte> encode_picture(const Frame& frame, const PictureOptions& options) {
+std::vector<std::byte> encode_picture(const Frame& frame, const PictureOptions& options, const Control& control) {
     const bool alpha = options.no_background;
     const Vec3f background = options.render.background;
-    if (is_jpeg(options.output)) return encode_jpeg(to_srgb8(frame.color, background, false));
+    if (is_jpeg(options.output)) return encode_jpeg(to_srgb8(frame.color, background, false, control));
     if (options.bits == 16)
-        return encode_png16(to_srgb16(frame.color, background, alpha), frame.color.width(), frame.color.height(),
-                            alpha ? 4 : 3);
-    return encode_png(to_srgb8(frame.color, background, alpha), alpha ? 4 : 3);
+        return encode_png16(to_srgb16(frame.color, background, alpha, control), frame.color.width(),
+                            frame.color.height(), alpha ? 4 : 3, control);
+    return encode_png(to_srgb8(frame.color, background, alpha, control), alpha ? 4 : 3, control);
 }
 
-void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report) {
-    const std::vector<std::byte> bytes = encode_picture(frame, options);
+void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report, const Control& control) {
+    const std::vector<std::byte> bytes = encode_picture(frame, options, control);
     write_file(options.output, bytes, options.no_clobber);
     if (!asks_for_report(options)) return;
     report.sha256 = sha256(bytes);

@@ -21,11 +21,12 @@ void check_size(Vec2i size, std::uint64_t max_memory, const std::string& where);
 void check_outputs(const PictureOptions& options, std::uint64_t max_memory);
 
 /// `frame` as the bytes of a file whose kind the output's extension says.
-[[nodiscard]] std::vector<std::byte> encode_picture(const Frame& frame, const PictureOptions& options);
+[[nodiscard]] std::vector<std::byte> encode_picture(const Frame& frame, const PictureOptions& options,
+                                                    const Control& control);
 
 /// Writes `frame` and says in `report` what was written where.
 /// @throws Error output E08xx.
-void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report);
+void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report, const Control& control);
 
 /// The report to --report and --json, whichever were asked for. @throws Error output E08xx.
 void write_report(const Report& report, const PictureOptions& options);

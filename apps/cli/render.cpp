@@ -12,6 +12,7 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     check_outputs(picture, memory_limit(options.common));
     const Scene scene = load(options.common, out, control);
     require_parts(scene);
+    ModelDigest digest = digest_model(options.common, picture, control);
     Report report;
     report.run.load = total.seconds();
     const std::vector<PartId> focus = select_parts(scene, options.focus, "--focus");
@@ -37,7 +38,7 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     const Stopwatch writing;
     if (!picture.output.empty()) {
         out.progress("write", 0);
-        write_picture(frame, picture, report.picture);
+        write_picture(frame, picture, report.picture, control);
         out.done(picture.output == "-" ? "standard output" : escaped(picture.output));
     }
     report.run.write = writing.seconds();
@@ -49,7 +50,7 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     report.frame_rays = frame.rays;
     report.run.threads = thread_count(control);
     report.run.total = total.seconds();
-    fill_report(report, "render", scene, options.common, picture);
+    fill_report(report, "render", scene, options.common, picture, std::move(digest));
     write_report(report, picture);
     return kExitDone;
 }

@@ -86,6 +86,7 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
     check_outputs(picture, memory_limit(options.common));
     const Scene scene = load(options.common, out, control);
     require_parts(scene);
+    ModelDigest digest = digest_model(options.common, picture, control);
     const double loaded = total.seconds();
 
     RevealParams params;
@@ -115,12 +116,12 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
     if (!options.debug_dir.empty()) write_debug_pictures(options, revealed);
     if (!picture.output.empty() && opened > 0) {
         out.progress("write", 0);
-        write_picture(revealed.frame, picture, report.picture);
+        write_picture(revealed.frame, picture, report.picture, control);
         out.done(picture.output == "-" ? "standard output" : escaped(picture.output));
     }
     report.run.load = loaded, report.run.build = built;
     report.run.write = writing.seconds(), report.run.total = total.seconds();
-    fill_report(report, "reveal", scene, options.common, picture);
+    fill_report(report, "reveal", scene, options.common, picture, std::move(digest));
     write_report(report, picture);
 
     if (opened == 0) {

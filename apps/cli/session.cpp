@@ -1,12 +1,11 @@
 #include "session.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include "picture.h"
-#include "porthole/base/sha256.h"
-#include "porthole/io/files.h"
 
 namespace porthole::cli {
 
@@ -57,8 +56,19 @@ void require_parts(const Scene& scene) {
         throw Error(ErrorKind::input, "E0206", scene.source, "holds no triangles: there is nothing to draw");
 }
 
+ModelDigest digest_model(const CommonOptions& common, const PictureOptions& picture, const Control& control) {
+    const std::filesystem::path model(common.model);
+    std::error_code failure;
+    const bool wanted = asks_for_report(picture) && model != "-" && std::filesystem::is_regular_file(model, failure);
+    return std::async(wanted ? std::launch::async : std::launch::deferred,
+                      [model, wanted, stop = control.stop]() -> std::optional<FileDigest> {
+                          if (!wanted) return std::nullopt;
+                          return digest_file(model, stop);
+                      });
+}
+
 void fill_report(Report& report, const char* command, const Scene& scene, const CommonOptions& common,
-                 const PictureOptions& picture) {
+                 const PictureOptions& picture, ModelDigest digest) {
     report.version = PORTHOLE_VERSION;
     report.command = command;
     report.model.path = common.model;
@@ -66,10 +76,9 @@ void fill_report(Report& report, const char* command, const Scene& scene, const 
     report.model.time = common.load.time;
     report.model.up = common.load.up;
     report.model.metres_per_unit = common.load.metres_per_unit;
-    if (common.model != "-" && asks_for_report(picture)) {
-        const FileBytes file{std::filesystem::path(common.model)};
-        report.model.bytes = file.bytes().size();
-        report.model.sha256 = sha256(file.bytes());
+    if (const std::optional<FileDigest> file = digest.get()) {
+        report.model.bytes = file->bytes;
+        report.model.sha256 = file->sha256;
     }
     report.picture.bits = picture.bits;
     report.picture.no_background = picture.no_background;

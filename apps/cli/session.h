@@ -2,10 +2,13 @@
 #pragma once
 
 #include <chrono>
+#include <future>
+#include <optional>
 
 #include "options.h"
 #include "output.h"
 #include "porthole/base/parallel.h"
+#include "porthole/io/files.h"
 
 namespace porthole::cli {
 
@@ -37,9 +40,15 @@ void limit_memory(const CommonOptions& options);
 /// @throws Error input E0206 when there is nothing to draw.
 void require_parts(const Scene& scene);
 
+/// The model file's digest, taken beside other work; unset if no report asks for it, or if the
+/// model is no file that can be read again.
+using ModelDigest = std::future<std::optional<FileDigest>>;
+[[nodiscard]] ModelDigest digest_model(const CommonOptions& common, const PictureOptions& picture,
+                                       const Control& control);
+
 /// What every report says of the program, the model and the run.
 void fill_report(Report& report, const char* command, const Scene& scene, const CommonOptions& common,
-                 const PictureOptions& picture);
+                 const PictureOptions& picture, ModelDigest digest);
 
 /// The subcommands. Each returns an exit code or throws Error or Cancelled.
 int run_reveal(const RevealOptions& options, Output& out, const Control& control);

@@ -24,5 +24,19 @@ TEST(Sha256, LengthsAroundABlock) {
     EXPECT_EQ(digest(std::string(65, 'x')), "9537c5fdf120482f7d58d25e9ed583f52c02b4e304ea814db1633ad565aed7e9");
 }
 
+TEST(Sha256, PiecesGiveWhatTheWholeGives) {
+    std::string text;
+    for (int i = 0; i < 1000; ++i) text += char(i * 7);
+    for (const std::size_t piece : {1u, 3u, 63u, 64u, 65u, 200u}) {
+        Sha256 sum;
+        for (std::size_t at = 0; at < text.size(); at += piece) {
+            const std::string part = text.substr(at, piece);
+            sum.add(std::as_bytes(std::span(part)));
+        }
+        EXPECT_EQ(sum.digest(), digest(text)) << piece;
+        EXPECT_EQ(sum.digest(), sum.digest());
+    }
+}
+
 } // namespace
 } // namespace porthole

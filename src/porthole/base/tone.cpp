@@ -1,5 +1,6 @@
 #include "porthole/base/tone.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -71,31 +72,42 @@ Vec3f over(Vec4f c, Vec3f background) {
     return {c.x + background.x * rest, c.y + background.y * rest, c.z + background.z * rest};
 }
 
+/// Calls body(i) for the index of every pixel, in runs of many.
+template <typename Body> void for_each_pixel(const Image<Vec4f>& image, const Control& control, const Body& body) {
+    constexpr std::size_t kRun = std::size_t(1) << 17;
+    const std::size_t n = image.pixels().size();
+    parallel_for((n + kRun - 1) / kRun, control, [&](std::size_t run) {
+        const std::size_t end = std::min(n, (run + 1) * kRun);
+        for (std::size_t i = run * kRun; i < end; ++i) body(i);
+    });
+}
+
 } // namespace
 
-Image<Rgba8> to_srgb8(const Image<Vec4f>& linear, Vec3f background, bool keep_alpha) {
+Image<Rgba8> to_srgb8(const Image<Vec4f>& linear, Vec3f background, bool keep_alpha, const Control& control) {
     static const Encoder<255, 7> encode;
     Image<Rgba8> out(linear.window());
-    for (std::size_t i = 0; i < linear.pixels().size(); ++i) {
+    for_each_pixel(linear, control, [&](std::size_t i) {
         const Vec4f c = linear.pixels()[i];
         const Vec3f v = keep_alpha ? straight(c) : over(c, background);
         out.pixels()[i] = {std::uint8_t(encode(v.x)), std::uint8_t(encode(v.y)), std::uint8_t(encode(v.z)),
                            keep_alpha ? std::uint8_t(linear_code<255>(c.w)) : std::uint8_t(255)};
-    }
+    });
     return out;
 }
 
-std::vector<std::uint16_t> to_srgb16(const Image<Vec4f>& linear, Vec3f background, bool keep_alpha) {
+std::vector<std::uint16_t> to_srgb16(const Image<Vec4f>& linear, Vec3f background, bool keep_alpha,
+                                     const Control& control) {
     static const Encoder<65535, 12> encode;
     const std::size_t channels = keep_alpha ? 4 : 3;
     std::vector<std::uint16_t> out(linear.pixels().size() * channels);
-    for (std::size_t i = 0; i < linear.pixels().size(); ++i) {
+    for_each_pixel(linear, control, [&](std::size_t i) {
         const Vec4f c = linear.pixels()[i];
         const Vec3f v = keep_alpha ? straight(c) : over(c, background);
         std::uint16_t* const p = out.data() + i * channels;
         p[0] = encode(v.x), p[1] = encode(v.y), p[2] = encode(v.z);
         if (keep_alpha) p[3] = linear_code<65535>(c.w);
-    }
+    });
     return out;
 }
 

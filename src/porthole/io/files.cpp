@@ -15,6 +15,8 @@
 #include <vector>
 
 #include "porthole/base/error.h"
+#include "porthole/base/parallel.h"
+#include "porthole/base/sha256.h"
 
 namespace porthole {
 namespace fs = std::filesystem;
@@ -97,6 +99,14 @@ std::string read_stream(int fd, const std::string& where, std::uint64_t max_byte
     }
 }
 
+/// Of a descriptor that was just opened for reading.
+void require_open(const Descriptor& file, const std::string& where) {
+    if (file.get() >= 0) return;
+    const int error = errno;
+    if (error == ENOENT || error == ENOTDIR) throw Error(ErrorKind::input, "E0201", where, "there is no such file");
+    throw Error(ErrorKind::input, "E0202", where, "cannot be opened: " + system_reason(error));
+}
+
 } // namespace
 
 FileBytes::FileBytes(const fs::path& path, std::uint64_t max_bytes) {
@@ -104,11 +114,7 @@ FileBytes::FileBytes(const fs::path& path, std::uint64_t max_bytes) {
     const std::string where = standard_input ? std::string("standard input") : path.string();
     const Descriptor file(standard_input ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
                                          : open_retrying(path.c_str(), O_RDONLY | O_NOCTTY));
-    if (file.get() < 0) {
-        const int error = errno;
-        if (error == ENOENT || error == ENOTDIR) throw Error(ErrorKind::input, "E0201", where, "there is no such file");
-        throw Error(ErrorKind::input, "E0202", where, "cannot be opened: " + system_reason(error));
-    }
+    require_open(file, where);
     struct stat status {};
     if (::fstat(file.get(), &status) != 0)
         throw Error(ErrorKind::input, "E0202", where, "cannot be read: " + system_reason(errno));
@@ -166,6 +172,29 @@ FileBytes& FileBytes::operator=(FileBytes&& other) noexcept {
 
 FileBytes::~FileBytes() {
     if (mapped_) ::munmap(mapped_, bytes_.size());
+}
+
+FileDigest digest_file(const fs::path& path, const std::stop_token& stop) {
+    const std::string where = path.string();
+    // Without waiting for somebody to write, should it be a pipe.
+    const Descriptor file(open_retrying(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK));
+    require_open(file, where);
+    struct stat status {};
+    if (::fstat(file.get(), &status) != 0 || !S_ISREG(status.st_mode))
+        throw Error(ErrorKind::input, "E0202", where, "is not a regular file");
+    FileDigest out;
+    Sha256 sum;
+    std::vector<char> block(std::size_t(1) << 18);
+    for (;;) {
+        if (stop.stop_requested()) throw Cancelled{};
+        const ssize_t n = read_fully(file.get(), block.data(), block.size());
+        if (n < 0) throw Error(ErrorKind::input, "E0202", where, "cannot be read: " + system_reason(errno));
+        if (n == 0) break;
+        sum.add(std::as_bytes(std::span(block).first(std::size_t(n))));
+        out.bytes += std::uint64_t(n);
+    }
+    out.sha256 = sum.digest();
+    return out;
 }
 
 // ---------------------------------------------------------------- files beside the model

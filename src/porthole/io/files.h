@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -13,7 +14,8 @@ namespace porthole {
 /// A whole file, mapped read-only (regular files) or read into memory (pipes). Move-only.
 class FileBytes {
 public:
-    /// "-" is standard input. Files up to 64 MB are copied, larger ones mapped.
+    /// "-" is standard input. Files up to 64 MB are copied, larger ones mapped: who reads one that
+    /// another program cuts short meanwhile gets SIGBUS.
     /// @param max_bytes  most that is read from a pipe.
     /// @throws Error input E0201 not found, E0202 unreadable, a folder or a device, E0203
     ///         empty; limit E0902 when a pipe brings more than `max_bytes`.
@@ -33,6 +35,16 @@ private:
     std::string owned_;
     void* mapped_ = nullptr;
 };
+
+/// What tells a file apart.
+struct FileDigest {
+    std::uint64_t bytes = 0;
+    std::string sha256;
+};
+
+/// Reads a file in small blocks, so that none of it stays in memory.
+/// @throws Error input E0201, E0202 as FileBytes, also for what is not a regular file; Cancelled.
+[[nodiscard]] FileDigest digest_file(const std::filesystem::path& path, const std::stop_token& stop = {});
 
 /// The file that `reference` (a relative path or percent-encoded URI found inside `model`)
 /// names, if it is an existing regular file in the model's folder or below, after resolving
