@@ -170,7 +170,8 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
     merge(plan.cut_set,
           trace_spans(subject.whole, kMaskCutSet, view, beside, tolerance, control, &plan.rays.spans).parts);
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
-    plan.enclosing = enclosing_object(cut_bvh, view, plan.window, whole, control, plan.rays.enclosing);
+    plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, plan.window, whole, control,
+                                      plan.rays.enclosing);
 
     keep_clear(core, plan.target_ids.id, plan.enclosing, plan.depth_px);
     for (std::size_t i = 0; i < core.pixels().size(); ++i)

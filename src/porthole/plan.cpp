@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <unordered_map>
 
 #include "porthole/plan_steps.h"
 #include "porthole/trace/outline.h"
@@ -203,7 +204,8 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     for (const PartSpan& span : plan.spans.parts) plan.cut_set.push_back(span.part);
     if (plan.cut_set.empty()) return;
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
-    plan.enclosing = enclosing_object(cut_bvh, view, plan.window, windows.whole, control, plan.rays.enclosing);
+    plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, plan.window, windows.whole, control,
+                                      plan.rays.enclosing);
 
     Mask covered(plan.window, 0);
     for (std::size_t i = 0; i < covered.pixels().size(); ++i)
@@ -234,15 +236,30 @@ std::vector<PartId> no_room(const ViewPlan& plan, const PlanParams& params) {
 
 } // namespace
 
-Mask enclosing_object(const Bvh& cut_set, const View& view, Rect window, Rect whole, const Control& control,
-                      std::int64_t& rays) {
-    // Background that reaches the edge of picture and margin is outside, so when some reaches
-    // the edge of `window` the whole of it has to be traced to tell.
-    Mask enclosing = fill_enclosed(trace_coverage(cut_set, view, window, control, &rays));
-    if (window == whole) return enclosing;
-    const std::vector<std::uint8_t>& pixels = enclosing.pixels();
-    if (std::find(pixels.begin(), pixels.end(), std::uint8_t{0}) == pixels.end()) return enclosing;
-    return cropped(fill_enclosed(trace_coverage(cut_set, view, whole, control, &rays)), window);
+Mask enclosing_object(const Scene& scene, std::span<const PartId> parts, const Bvh& cut_set, const View& view,
+                      Rect window, Rect whole, const Control& control, std::int64_t& rays) {
+    // One box a part: what none of them touches is background without a ray.
+    ClusterBoxes boxes;
+    boxes.by_mesh.resize(scene.meshes.size());
+    for (const PartId id : parts) {
+        const std::uint32_t mesh = scene.parts[index(id)].mesh;
+        boxes.by_mesh[mesh] = {scene.meshes[mesh].bounds};
+    }
+    const BlockMask blocks = mark_blocks(scene, parts, boxes, view, whole);
+    const Mask hit = trace_coverage(cut_set, view, window, &blocks, control, &rays);
+
+    std::unordered_map<std::uint64_t, Mask> traced; // by block
+    const auto hit_beyond = [&](Vec2i p) {
+        const Vec2i b{p.x >> 2, p.y >> 2};
+        if (!blocks.marked(b.x, b.y)) return false;
+        Mask& block = traced[std::uint64_t(std::uint32_t(b.y)) << 32 | std::uint32_t(b.x)];
+        if (block.empty()) {
+            const Rect pixels = Rect{4 * b.x, 4 * b.y, 4 * b.x + 4, 4 * b.y + 4}.intersected(whole);
+            block = trace_coverage(cut_set, view, pixels, nullptr, control, &rays);
+        }
+        return block(p.x, p.y) != 0;
+    };
+    return fill_enclosed(hit, whole, hit_beyond);
 }
 
 Subject make_subject(const MeshBvhs& meshes, std::span<const PartId> targets, std::span<const PartId> keep,

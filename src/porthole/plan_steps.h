@@ -22,8 +22,12 @@ inline IdBuffer cropped(const IdBuffer& ids, Rect window) {
 }
 
 /// E on `window`, a part of `whole`, the picture and its margin.
-[[nodiscard]] Mask enclosing_object(const Bvh& cut_set, const View& view, Rect window, Rect whole,
-                                    const Control& control, std::int64_t& rays);
+/// @param cut_set  hierarchy of `parts`.
+/// Cost: one occlusion ray a pixel of `window` that the parts' boxes touch, and beyond it those that lie
+/// on the way of the background to the edge of `whole`.
+[[nodiscard]] Mask enclosing_object(const Scene& scene, std::span<const PartId> parts, const Bvh& cut_set,
+                                    const View& view, Rect window, Rect whole, const Control& control,
+                                    std::int64_t& rays);
 
 /// Width in pixels of a length that users give. Not below 0.
 [[nodiscard]] double length_px(const Subject& subject, const View& view, Length length);

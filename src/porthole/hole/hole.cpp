@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <string>
 
@@ -97,75 +96,7 @@ void draw_discs(Hole& hole, const IdBuffer& target_ids, std::span<const PowerSit
     hole.bounds = bounds_of(hole.mask);
 }
 
-/// Runs of background pixels, joined where they touch from row to row.
-class BackgroundRuns {
-public:
-    explicit BackgroundRuns(const Mask& hit) {
-        const Rect w = hit.window();
-        std::size_t above = 0, row_begin = 0;
-        for (std::int32_t y = w.y0; y < w.y1; ++y) {
-            above = row_begin, row_begin = runs.size();
-            const std::uint8_t* row = hit.row(y);
-            for (std::int32_t x = 0; x < w.width();) {
-                const void* zero = std::memchr(row + x, 0, std::size_t(w.width() - x));
-                if (!zero) break;
-                const auto begin = std::int32_t(static_cast<const std::uint8_t*>(zero) - row);
-                x = first_set(row, begin, w.width());
-                const bool at_edge = y == w.y0 || y == w.y1 - 1 || begin == 0 || x == w.width();
-                runs.push_back({begin, x, y, at_edge ? 0 : std::int32_t(runs.size())});
-            }
-            // Runs of both rows are in order of x: walk them side by side.
-            for (std::size_t a = above, b = row_begin; a < row_begin && b < runs.size();) {
-                if (runs[a].begin < runs[b].end && runs[b].begin < runs[a].end) join(std::int32_t(a), std::int32_t(b));
-                runs[a].end < runs[b].end ? ++a : ++b;
-            }
-        }
-    }
-
-    struct Run {
-        std::int32_t begin = 0, end = 0; ///< from the window's left edge
-        std::int32_t y = 0;
-        std::int32_t parent = 0; ///< run 0 stands for the open background
-    };
-    std::vector<Run> runs{Run{}};
-
-    [[nodiscard]] std::int32_t root(std::int32_t i) {
-        while (parent(i) != i) i = parent(i) = parent(parent(i));
-        return i;
-    }
-
-private:
-    std::int32_t& parent(std::int32_t i) { return runs[std::size_t(i)].parent; }
-    void join(std::int32_t a, std::int32_t b) {
-        a = root(a), b = root(b);
-        // Smaller index on top: the open background stays a root.
-        parent(std::max(a, b)) = std::min(a, b);
-    }
-    static std::int32_t first_set(const std::uint8_t* row, std::int32_t x, std::int32_t end) {
-        for (std::uint64_t eight = 0; x + 8 <= end; x += 8) {
-            std::memcpy(&eight, row + x, 8);
-            if (eight != 0) break;
-        }
-        while (x < end && row[x] == 0) ++x;
-        return x;
-    }
-};
-
 } // namespace
-
-Mask fill_enclosed(const Mask& hit) {
-    Mask filled(hit.window());
-    std::transform(hit.pixels().begin(), hit.pixels().end(), filled.pixels().begin(),
-                   [](std::uint8_t h) { return std::uint8_t(h != 0); });
-    BackgroundRuns background(hit);
-    for (std::size_t i = 1; i < background.runs.size(); ++i) {
-        if (background.root(std::int32_t(i)) == 0) continue;
-        const BackgroundRuns::Run& run = background.runs[i];
-        std::uint8_t* row = filled.row(run.y);
-        std::fill(row + run.begin, row + run.end, std::uint8_t(1));
-    }
-    return filled;
-}
 
 int hole_margin_px(const HoleParams& params) {
     // The interpolated distance reads a pixel beyond the picture, and there discs whose rim

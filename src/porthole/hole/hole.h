@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,17 @@ struct Hole {
 /// background regions they enclose. A 4-connected background region that touches the
 /// window's edge is not enclosed. Values 0 and 1. Cost: linear in the window.
 [[nodiscard]] Mask fill_enclosed(const Mask& hit);
+
+/// Whether a ray through a pixel beyond the window hits.
+using HitBeyond = std::function<bool(Vec2i)>;
+
+/// fill_enclosed() of all of `whole`, cropped to the window of `hit`, without knowing the rest of it:
+/// a region that runs into the window's edge is followed beyond, towards the nearest edge of
+/// `whole` first, until it meets that edge or ends.
+/// @param whole       contains the window.
+/// @param hit_beyond  is asked about pixels of `whole` outside the window, in an order that depends on
+///                    nothing but the answers; more than once about some.
+[[nodiscard]] Mask fill_enclosed(const Mask& hit, Rect whole, const HitBeyond& hit_beyond);
 
 /// How far around the picture targets, occluders and E must be traced for the hole inside the
 /// picture to be the same as if everything were: a disc reaches one depth in from outside the

@@ -110,6 +110,28 @@ TEST(FillEnclosed, EqualsAFloodFromTheEdge) {
     }
 }
 
+TEST(FillEnclosed, OfACropFollowsWhatLeavesIt) {
+    std::mt19937 random(5);
+    std::int64_t asked = 0, beyond = 0;
+    for (int round = 0; round < 600; ++round) {
+        const Rect whole{-5, 3, -5 + 4 + pick(random, 60), 3 + 4 + pick(random, 40)};
+        const Mask hit = random_mask(whole, kAllKinds[round % 5], random);
+        const int x0 = whole.x0 + pick(random, whole.width()), y0 = whole.y0 + pick(random, whole.height());
+        const Rect crop{x0, y0, x0 + 1 + pick(random, whole.x1 - x0), y0 + 1 + pick(random, whole.y1 - y0)};
+        const auto cropped = [&](const Mask& mask) {
+            return mask_where(crop, [&](int x, int y) { return mask(x, y) != 0; });
+        };
+        const auto hit_beyond = [&](Vec2i p) {
+            EXPECT_TRUE(whole.contains(p.x, p.y) && !crop.contains(p.x, p.y));
+            ++asked;
+            return hit(p.x, p.y) != 0;
+        };
+        ASSERT_EQ(fill_enclosed(cropped(hit), whole, hit_beyond), cropped(fill_enclosed(hit))) << "round " << round;
+        beyond += std::int64_t(whole.width()) * whole.height() - std::int64_t(crop.width()) * crop.height();
+    }
+    EXPECT_LT(asked, beyond / 2);
+}
+
 TEST(GrowHole, IsTheTargetsAndTheDiscsExactly) {
     std::mt19937 random(2);
     for (int round = 0; round < 60; ++round) {

@@ -252,7 +252,8 @@ Spans trace_spans(const Bvh& bvh, std::uint32_t mask, const View& view, const Id
     return spans;
 }
 
-Mask trace_coverage(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
+Mask trace_coverage(const Bvh& bvh, const View& view, Rect window, const BlockMask* blocks, const Control& control,
+                    std::int64_t* rays) {
     Mask hit(window, 0);
     std::atomic<std::int64_t> traced{0};
     parallel_for_tiles(window, kTile, control, [&](Rect tile) {
@@ -260,6 +261,7 @@ Mask trace_coverage(const Bvh& bvh, const View& view, Rect window, const Control
         float depth_per_t[kLanes];
         std::int64_t n = 0;
         for_each_block(tile, [&](int x0, int y0) {
+            if (blocks && !blocks->marked(floor_div4(x0), floor_div4(y0))) return;
             n += set_block_rays(packet, depth_per_t, view, x0, y0, tile);
             occluded_by_any(bvh, packet);
             for (int i = 0; i < kLanes; ++i)

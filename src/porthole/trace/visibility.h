@@ -66,9 +66,10 @@ struct Spans {
                                 float tolerance, const Control& control = {}, std::int64_t* rays = nullptr);
 
 /// 1 where a ray through the pixel centre hits anything of `bvh`.
+/// @param blocks  null, or the blocks that its parts' boxes touch: the others are not traced.
 /// Cost: one occlusion ray a pixel, cheaper than a nearest hit.
-[[nodiscard]] Mask trace_coverage(const Bvh& bvh, const View& view, Rect window, const Control& control = {},
-                                  std::int64_t* rays = nullptr);
+[[nodiscard]] Mask trace_coverage(const Bvh& bvh, const View& view, Rect window, const BlockMask* blocks = nullptr,
+                                  const Control& control = {}, std::int64_t* rays = nullptr);
 
 /// At the pixels of `mask` the depth of the farthest surface of `bvh` nearer than `limit`
 /// there; -infinity where there is none and outside the mask.
