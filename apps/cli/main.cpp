@@ -139,6 +139,7 @@ void add_picture(CLI::App& app, PictureOptions& o) {
     app.add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 8)")
         ->type_name("N")
         ->check(CLI::Range(1, 4096));
+    app.add_flag("--uniform", o.render.uniform, "All the samples in every pixel, to compare with; slow");
     app.add_option("--bounces", o.render.max_bounces,
                    "Most reflections, refractions and see-through surfaces along a path (default 6)")
         ->type_name("N")

@@ -140,9 +140,10 @@ template <Is<PlanParams> T, typename Visit> void for_each(T& params, Visit&& vis
 }
 
 template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
-    auto& [samples, ao_samples, shadows, max_bounces, refine, shading, emphasis, lines, cap, cap_tint, rim_px,
+    auto& [samples, uniform, ao_samples, shadows, max_bounces, refine, shading, emphasis, lines, cap, cap_tint, rim_px,
            background] = params;
     visit("samples", samples);
+    visit("uniform", uniform);
     visit("ao_samples", ao_samples);
     visit("shadows", shadows);
     visit("max_bounces", max_bounces);

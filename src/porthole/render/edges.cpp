@@ -87,6 +87,12 @@ void mark_row(const Picture& picture, Rect tile, Planes& p, int row, int dx, int
 } // namespace
 
 void find_edges(Picture& picture, Rect tile) {
+    if (picture.params.uniform) {
+        for (int y = tile.y0; y < tile.y1; ++y)
+            for (int x = tile.x0; x < tile.x1; ++x)
+                picture.edges(x, y) = picture.buffer.pixels(x, y).has(Pixel::traced) ? 1 : 0;
+        return;
+    }
     const auto planes = std::make_unique<Planes>();
     load(picture, tile, *planes);
     for (int row = 0; row < tile.height() + 2; ++row) {
