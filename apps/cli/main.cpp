@@ -136,7 +136,7 @@ void add_picture(CLI::App& app, PictureOptions& o) {
         app, "--background", "#rrggbb, white or black (default white)", "COLOR",
         [&o](const std::string& text, const std::string& option) { o.render.background = parse_color(text, option); });
     app.add_flag("--no-background", o.no_background, "Transparent where there is no model");
-    app.add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 8)")
+    app.add_option("--samples", o.render.samples, "Most samples per pixel, spent where neighbours differ (default 16)")
         ->type_name("N")
         ->check(CLI::Range(1, 4096));
     app.add_flag("--uniform", o.render.uniform, "All the samples in every pixel, to compare with; slow");

@@ -27,7 +27,7 @@ struct Picture {
     const Camera& camera;
     GBuffer buffer;
     Image<Vec4f> color; ///< display-linear, premultiplied; the buffer's window
-    Mask edges;         ///< 1 where the first sample is not enough
+    Mask edges;         ///< not 0 where the first sample is not enough: see find_edges()
     Mask covered;       ///< 1 where only the ids are wanted; empty: nowhere
     Mask opened;        ///< with a cut: 1 where some sample is in the hole
     RayTotals rays;
@@ -58,13 +58,20 @@ void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector
 /// Pass 2: filters the light and shades the first samples.
 void shade_tile(Picture& picture, const Stage& stage, Rect tile);
 
-/// Pass 3: marks pixels that differ from a neighbour in part, side of the rim, crease,
-/// depth, brightness or colour.
+/// Pass 3: marks traced pixels whose first sample is not enough: those that differ from a neighbour
+/// in part, or across a crease or step in brightness or colour; those whose brightness is not
+/// what their neighbours on both sides have on average; those that the rim may cross. Only the
+/// first samples of traced pixels count, and all that is compared is what the screen shows.
+/// Picture::edges becomes the contrast with the neighbours in 255ths, at least 1. All traced pixels are
+/// marked with RenderParams::uniform.
 void find_edges(Picture& picture, Rect tile);
 
-/// Pass 4: traces the other samples of marked pixels and averages. What light reaches them is
-/// borrowed from a neighbouring pixel that saw the same surface, so that edges are as smooth as
-/// the surfaces beside them; traced only if there is none.
+/// Pass 4: more samples in marked pixels, 4, then twice as many each time, until a pixel has as many
+/// as the contrast of its samples, or half the contrast with its neighbours, asks for:
+/// RenderParams::samples x contrast^(3/4), twice that where the hole may be. The colour is their mean.
+/// Decides from the first samples and a pixel's own, so that tiles do not matter. What light reaches
+/// the samples is borrowed from a neighbouring pixel that saw the same surface, so that edges are as
+/// smooth as the surfaces beside them; traced only if there is none.
 void refine_tile(Picture& picture, const Stage& stage, Rect tile);
 
 } // namespace porthole

@@ -8,6 +8,12 @@ namespace {
 
 constexpr float kBorrowNormal = 0.9f;
 constexpr float kBorrowStep = 1.5f; ///< pixels off the tangent plane
+constexpr int kHoleFactor = 2;      ///< in the hole every sample that a pixel may have counts as two
+constexpr int kFirstLevel = 4;      ///< samples of the first level; each level has twice as many
+constexpr float kBeside = 0.5f;     ///< an edge beside a pixel whose samples agree counts this much
+
+/// Encoded roughly as files are: what the eye sees.
+Vec4f encoded(Vec4f c) { return {std::sqrt(c.x), std::sqrt(c.y), std::sqrt(c.z), c.w}; }
 
 /// Filtered light of a neighbouring pixel on the same surface, if there is one.
 std::optional<Reach> borrow_light(const GBuffer& buffer, const View& view, std::uint32_t key, const SurfacePoint& point,
@@ -39,24 +45,68 @@ PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole, int patte
     return ray;
 }
 
-/// Sample `s` of up to sixteen pixels, into slots group_index * 16 + lane of the shader.
-void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> pixels, int s, int group_index,
-                   Shader& shader, std::array<bool, kLanes>& in_hole, RayCounts& rays) {
+/// A pixel on its way through the levels.
+struct Refined {
+    Vec2i at;
+    int count = 1; ///< samples in `sum`
+    int most = 1;  ///< and never more than this
+    Vec4f sum;
+    Vec4f low, high;  ///< over the samples, encoded
+    float beside = 0; ///< encoded contrast with neighbouring pixels
+    bool opened = false;
+
+    void add(Vec4f color) {
+        sum = sum + color;
+        ++count;
+        extend(encoded(color));
+    }
+    void extend(Vec4f e) {
+        low = {std::min(low.x, e.x), std::min(low.y, e.y), std::min(low.z, e.z), std::min(low.w, e.w)};
+        high = {std::max(high.x, e.x), std::max(high.y, e.y), std::max(high.z, e.z), std::max(high.w, e.w)};
+    }
+    /// How far the samples lie apart, as the eye sees it.
+    [[nodiscard]] float contrast() const {
+        return std::max({high.x - low.x, high.y - low.y, high.z - low.z, high.w - low.w});
+    }
+};
+
+/// Samples after the level at which a pixel with `count` samples is.
+int next_level(int count) { return std::max(kFirstLevel, 2 * count); }
+
+/// Whether a pixel has samples enough. The error of n samples at an edge falls with n^(-3/4) or so
+/// and grows with the contrast; the sum of squares over a picture is least when n grows with contrast^(3/4).
+bool is_done(const Refined& pixel) {
+    if (pixel.count >= pixel.most) return true;
+    if (pixel.count < kFirstLevel) return false;
+    const float contrast = std::max(pixel.contrast(), kBeside * pixel.beside);
+    return float(pixel.count) >= float(pixel.most) * std::sqrt(contrast * std::sqrt(contrast));
+}
+
+/// One sample to be traced.
+struct Wanted {
+    std::uint32_t pixel; ///< among the tile's
+    int sample;
+};
+
+/// Up to sixteen samples, into slots from `first` of the shader.
+void trace_samples(Picture& picture, const Stage& stage, std::span<const Wanted> wanted, std::span<Refined> pixels,
+                   std::uint32_t first, Shader& shader, RayCounts& rays) {
     const GBuffer& buffer = picture.buffer;
-    const Vec2f at = pixel_sample(s);
     Samples16 samples;
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-        samples.x[i] = float(pixels[i].x) + at.x, samples.y[i] = float(pixels[i].y) + at.y;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const Vec2i p = pixels[wanted[i].pixel].at;
+        const Vec2f at = pixel_sample(wanted[i].sample);
+        samples.x[i] = float(p.x) + at.x, samples.y[i] = float(p.y) + at.y;
         samples.active[i] = true;
-        samples.may_open[i] = buffer.pixels(pixels[i].x, pixels[i].y).has(Pixel::may_open);
+        samples.may_open[i] = buffer.pixels(p.x, p.y).has(Pixel::may_open);
     }
     const Seen16 seen = picture.camera.trace(samples, rays);
 
     const bool flat = picture.params.shading == Shading::flat;
-    const std::uint32_t first = std::uint32_t(group_index) * kLanes;
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
         const std::uint32_t slot = first + std::uint32_t(i);
-        in_hole[i] = in_hole[i] || seen.in_hole[i];
+        Refined& pixel = pixels[wanted[i].pixel];
+        pixel.opened |= seen.in_hole[i];
         const Hit& hit = seen.hit[i];
         if (!hit.any()) {
             shader.miss(slot);
@@ -65,7 +115,7 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Vec2i> 
         const SurfacePoint p =
             picture.camera.surface(stage.placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
         // Each sample of a pixel takes another part of the patterns.
-        const int pattern = cell_rank(pixels[i].x, pixels[i].y) + s * 5;
+        const int pattern = cell_rank(pixel.at.x, pixel.at.y) + wanted[i].sample * 5;
         Reach reach;
         if (!flat) {
             const std::uint32_t key = GBuffer::key(hit.part, seen.in_hole[i], hit.cap);
@@ -136,43 +186,54 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
 }
 
 void refine_tile(Picture& picture, const Stage& stage, Rect tile) {
-    const int n = picture.params.samples;
-    std::vector<Vec2i> todo;
+    const RenderParams& params = picture.params;
+    std::vector<Refined> pixels;
     for (int by = tile.y0 & ~(kCell - 1); by < tile.y1; by += kCell)
         for (int bx = tile.x0 & ~(kCell - 1); bx < tile.x1; bx += kCell)
             for (int i = 0; i < kCellPixels; ++i) {
                 const int x = bx + i % kCell, y = by + i / kCell;
-                if (tile.contains(x, y) && picture.edges(x, y)) todo.push_back({x, y});
+                if (!tile.contains(x, y) || !picture.edges(x, y)) continue;
+                const Pixel& pixel = picture.buffer.pixels(x, y);
+                if (!pixel.has(Pixel::traced)) continue;
+                Refined r;
+                r.at = {x, y};
+                r.most = params.samples * (pixel.has(Pixel::may_open) && !params.uniform ? kHoleFactor : 1);
+                r.sum = picture.color(x, y);
+                r.low = r.high = encoded(r.sum);
+                r.beside = float(picture.edges(x, y)) * (1.0f / 255.0f);
+                r.opened = picture.opened(x, y) != 0;
+                pixels.push_back(r);
             }
-    if (todo.empty()) return;
+    if (pixels.empty()) return;
     RayCounts rays;
     // Samples are shaded in groups, so that mirrored and refracted rays fill their packets.
-    constexpr int kGroup = 16;
-    Shader shader(stage, std::size_t(kGroup) * kLanes, true, rays);
-    for (std::size_t begin = 0; begin < todo.size(); begin += kLanes) {
-        const std::span<const Vec2i> pixels(todo.data() + begin, std::min<std::size_t>(kLanes, todo.size() - begin));
-        std::array<Vec4f, kLanes> sum;
-        std::array<bool, kLanes> in_hole{};
-        for (std::size_t i = 0; i < pixels.size(); ++i) {
-            sum[i] = picture.color(pixels[i].x, pixels[i].y);
-            in_hole[i] = picture.opened(pixels[i].x, pixels[i].y) != 0;
+    constexpr std::size_t kGroup = 16 * kLanes;
+    Shader shader(stage, kGroup, true, rays);
+    std::vector<Wanted> wanted;
+    for (;;) {
+        // The samples of one pixel follow each other: what is traced together lies close together.
+        wanted.clear();
+        for (std::size_t k = 0; k < pixels.size(); ++k) {
+            const Refined& pixel = pixels[k];
+            if (params.uniform ? pixel.count >= pixel.most : is_done(pixel)) continue;
+            const int end = std::min(next_level(pixel.count), pixel.most);
+            for (int s = pixel.count; s < end; ++s) wanted.push_back({std::uint32_t(k), s});
         }
-        for (int s0 = 1; s0 < n; s0 += kGroup) {
-            const int count = std::min(kGroup, n - s0);
+        if (wanted.empty()) break;
+        for (std::size_t begin = 0; begin < wanted.size(); begin += kGroup) {
+            const auto group = std::span(wanted).subspan(begin, std::min(kGroup, wanted.size() - begin));
             shader.clear();
-            for (int s = 0; s < count; ++s) trace_samples(picture, stage, pixels, s0 + s, s, shader, in_hole, rays);
+            for (std::size_t i = 0; i < group.size(); i += kLanes)
+                trace_samples(picture, stage, group.subspan(i, std::min<std::size_t>(kLanes, group.size() - i)), pixels,
+                              std::uint32_t(i), shader, rays);
             shader.finish();
-            for (int s = 0; s < count; ++s)
-                for (std::size_t i = 0; i < pixels.size(); ++i) {
-                    const Vec4f c = display_color(shader.radiance(std::uint32_t(s) * kLanes + std::uint32_t(i)),
-                                                  picture.params.background);
-                    sum[i] = sum[i] + c;
-                }
+            for (std::size_t i = 0; i < group.size(); ++i)
+                pixels[group[i].pixel].add(display_color(shader.radiance(std::uint32_t(i)), params.background));
         }
-        for (std::size_t i = 0; i < pixels.size(); ++i) {
-            picture.color(pixels[i].x, pixels[i].y) = sum[i] * (1.0f / float(n));
-            picture.opened(pixels[i].x, pixels[i].y) = in_hole[i] ? 1 : 0;
-        }
+    }
+    for (const Refined& pixel : pixels) {
+        picture.color(pixel.at.x, pixel.at.y) = pixel.sum * (1.0f / float(pixel.count));
+        picture.opened(pixel.at.x, pixel.at.y) = pixel.opened ? 1 : 0;
     }
     picture.rays.add(rays);
 }

@@ -40,9 +40,10 @@ enum class Lines : std::uint8_t {
 };
 
 struct RenderParams {
-    int samples = 8;    ///< most samples per pixel, [1, 4096], spent where neighbours differ; 1: one at each centre
+    int samples = 16;     ///< most samples per pixel, [1, 4096], spent where neighbours differ, and twice as many in
+                          ///< the hole; 1: one at each centre
     bool uniform = false; ///< all the samples in every pixel: the oracle of antialiasing, and dear
-    int ao_samples = 4; ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
+    int ao_samples = 4;   ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
     bool shadows = true;
     int max_bounces = 6; ///< reflections, refractions and blended surfaces along one path, [0, 64]
     Refine refine = Refine::full;

@@ -144,8 +144,9 @@ TEST(Render, EdgeSamplesApproachTheCoverage) {
     view.half_height = 1;
     RenderParams params;
     params.samples = 64;
-    const Frame f = b.draw(view, params);
+    const Frame f = b.draw(view, params), usual = b.draw(view);
     int partly = 0;
+    double squares = 0;
     for (int y = 0; y < 64; ++y)
         for (int x = 0; x < 64; ++x) {
             // The upper edge: world y = -0.4 + (x + 5) / 10.
@@ -157,9 +158,56 @@ TEST(Render, EdgeSamplesApproachTheCoverage) {
                     covered += wy < -0.4 + (wx + 5) / 10;
                 }
             EXPECT_NEAR(double(f.color(x, y).w), covered / (n * n), 0.04) << x << ' ' << y;
-            partly += covered > 0 && covered < n * n;
+            if (!(covered > 0 && covered < n * n)) continue;
+            ++partly;
+            const double error = double(usual.color(x, y).w) - covered / (n * n);
+            squares += error * error;
         }
     EXPECT_GE(partly, 64);
+    EXPECT_LT(std::sqrt(squares / partly), 0.04); // with the samples of a picture
+}
+
+/// Mean squared difference of what the screen shows, over white.
+double squared_error(const Frame& a, const Frame& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.color.pixels().size(); ++i) {
+        const Vec4f p = a.color.pixels()[i], q = b.color.pixels()[i];
+        const auto shown = [](float v, float w) { return std::sqrt(std::max(0.0, double(v) + 1 - double(w))); };
+        for (const double d :
+             {shown(p.x, p.w) - shown(q.x, q.w), shown(p.y, p.w) - shown(q.y, q.w), shown(p.z, p.w) - shown(q.z, q.w)})
+            sum += d * d;
+    }
+    return sum / (3 * double(a.color.pixels().size()));
+}
+
+TEST(Render, UniformSamplesAreInEveryPixel) {
+    const Built b(still_life());
+    const View view = look_at({0.4f, 1.2f, 3}, {0, 0.3f, 0}, 61, 47);
+    RenderParams params;
+    params.uniform = true;
+    for (const int n : {1, 3, 16}) {
+        params.samples = n;
+        EXPECT_EQ(b.draw(view, params).rays.primary, std::int64_t(n) * 61 * 47);
+    }
+}
+
+TEST(Render, SamplesAtEdgesAreAsGoodAsSamplesEverywhere) {
+    // Without mirrors and glass: what is lit in them depends on the sample, not only on where it lies.
+    Scene s = still_life();
+    for (const std::size_t m : {2u, 3u, 4u}) s.materials[m] = matte({0.2f, 0.3f, 0.8f});
+    const Built b(std::move(s));
+    const View view = look_at({0.4f, 1.2f, 3}, {0, 0.3f, 0}, 203, 151);
+    RenderParams reference, everywhere, edges;
+    reference.samples = 256, everywhere.samples = 16;
+    reference.uniform = everywhere.uniform = true;
+    edges.samples = 32;
+    const Frame best = b.draw(view, reference), all = b.draw(view, everywhere), some = b.draw(view, edges);
+    // Within half a decibel, for a quarter of the camera rays.
+    EXPECT_LT(squared_error(some, best), 1.122 * squared_error(all, best));
+    EXPECT_LT(some.rays.primary, all.rays.primary / 4);
+    // More samples are better.
+    edges.samples = 8;
+    EXPECT_GT(squared_error(b.draw(view, edges), best), 2 * squared_error(some, best));
 }
 
 TEST(Render, AMirrorShowsWhatStandsBeforeIt) {

@@ -19,8 +19,10 @@ inline constexpr int kCellPixels = kCell * kCell;
 /// ranks that follow each other lie far apart.
 [[nodiscard]] int cell_rank(int x, int y);
 
-/// Position of sample `i` of any pixel in [0,1)^2; sample 0 is the centre. The R2 sequence
-/// (Roberts 2018): every prefix is evenly spread, so 4 samples are part of 8.
+/// Position of sample `i` of any pixel in [0,1)^2; sample 0 is the centre. Nested: the first 4
+/// are part of the first 8 and so on, and the first 4, 8, 16, 32 and 64 each measure what an edge
+/// covers of the pixel as well as points found by descent do, within .10, .06, .034, .020 and .012 (root
+/// mean square). After 64 the R2 sequence (Roberts 2018) goes on.
 [[nodiscard]] Vec2f pixel_sample(int i);
 
 /// Point `i` of `n` in the unit disc, evenly spread (Vogel's spiral); i < n.

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
+#include <utility>
 
 namespace porthole {
 namespace {
@@ -42,6 +44,36 @@ TEST(PixelSample, StartsAtTheCentreAndSpreads) {
     for (int i = 0; i < 64; ++i) mx += double(pixel_sample(i).x), my += double(pixel_sample(i).y);
     EXPECT_NEAR(mx / 64, 0.5, 0.02);
     EXPECT_NEAR(my / 64, 0.5, 0.02);
+}
+
+TEST(PixelSample, MeasuresWhatEdgesCoverAsWellAsItSays) {
+    // The share of a unit square on one side of a line at `offset` from its middle.
+    const auto covered = [](double c, double s, double offset) {
+        const double a = std::max(std::abs(c), std::abs(s)), b = std::min(std::abs(c), std::abs(s));
+        const double t = offset + 0.5 * (a + b);
+        const auto square = [](double v) { return v > 0 ? v * v : 0.0; };
+        return (square(t) - square(t - a) - square(t - b) + square(t - a - b)) / (2 * a * b);
+    };
+    const std::pair<int, double> expected[] = {{4, 0.10},   {8, 0.06},   {16, 0.034},
+                                               {32, 0.020}, {64, 0.012}, {256, 0.008}};
+    for (const auto& [n, most] : expected) {
+        double sum = 0;
+        int edges = 0;
+        for (int i = 0; i < 90; ++i) {
+            const double angle = 2 * 3.14159265358979 * (i + 0.37) / 90, c = std::cos(angle), s = std::sin(angle);
+            for (int k = 0; k < 40; ++k, ++edges) {
+                const double offset = ((k + 0.5) / 40 - 0.5) * (std::abs(c) + std::abs(s));
+                int inside = 0;
+                for (int j = 0; j < n; ++j) {
+                    const Vec2f p = pixel_sample(j);
+                    inside += (double(p.x) - 0.5) * c + (double(p.y) - 0.5) * s < offset;
+                }
+                const double error = double(inside) / n - covered(c, s, offset);
+                sum += error * error;
+            }
+        }
+        EXPECT_LT(std::sqrt(sum / edges), most) << n;
+    }
 }
 
 TEST(DiscPoint, FillsTheDiscEvenly) {
