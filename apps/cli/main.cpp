@@ -149,6 +149,29 @@ void add_picture(CLI::App& app, PictureOptions& o) {
         ->check(CLI::Range(0, 256));
     app.add_flag_callback(
         "--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
+    RefineParams& by = o.render.refine_by;
+    add_choice<Refine>(app, "--refine", o.render.refine,
+                       {{"full", Refine::full},
+                        {"adaptive", Refine::adaptive},
+                        {"paper1", Refine::paper1},
+                        {"paper2", Refine::paper2},
+                        {"expansion", Refine::expansion}},
+                       "Which pixels are traced: all of them; where blocks differ; or as the paper does, by its two "
+                       "versions of selective refinement or by selective expansion, one sample a pixel (default full)");
+    app.add_option("--macro", by.macro_px, "Size in pixels of the paper's macro pixels, a power of two (default 8)")
+        ->type_name("N");
+    app.add_option("--threshold", by.threshold_px, "The paper's smallest block in pixels, a power of two (default 1)")
+        ->type_name("N");
+    using Surface = RefineParams::Surface;
+    add_choice<Surface>(app, "--surface", by.surface, {{"part", Surface::part}, {"face", Surface::face}},
+                        "What paper1 and paper2 take for one visible surface (default part)");
+    add_read(app, "--guides",
+             "Positions of paper2's guide pixels in a block, such as \"0,0 1,0 0.5,1\" (default: its "
+             "four corners)",
+             "X,Y...",
+             [&by](const std::string& text, const std::string& option) { by.guides = parse_guides(text, option); });
+    app.add_flag("--compare-full", o.compare_full,
+                 "Draw the picture with every pixel traced as well; say and report how the two compare");
     add_choice<Lines>(app, "--lines", o.render.lines, {{"none", Lines::none}, {"rim", Lines::rim}, {"all", Lines::all}},
                       "rim: along the hole's rim and where its cut surfaces end; all: outlines and creases of every "
                       "part as well (default rim)");

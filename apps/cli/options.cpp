@@ -115,6 +115,23 @@ Vec3d parse_vector(const std::string& text, const std::string& option) {
     return v;
 }
 
+std::vector<Vec2f> parse_guides(const std::string& text, const std::string& option) {
+    const std::string expected = "3 to 64 positions such as \"0,0 1,0 0.5,1\", from 0 to 1, not all on one line";
+    std::string_view rest = text;
+    std::vector<Vec2f> guides;
+    while (!rest.empty()) {
+        const std::optional<double> x = take_number(rest);
+        if (!x || !rest.starts_with(',')) refuse(option, text, expected);
+        rest.remove_prefix(1);
+        const std::optional<double> y = take_number(rest);
+        if (!y) refuse(option, text, expected);
+        guides.push_back({float(*x), float(*y)});
+        if (!rest.empty() && !rest.starts_with(' ')) refuse(option, text, expected);
+        while (rest.starts_with(' ')) rest.remove_prefix(1);
+    }
+    return guides;
+}
+
 char parse_up(const std::string& text, const std::string& option) {
     const std::string axis = lowered(text.starts_with('+') ? text.substr(1) : text);
     if (axis != "y" && axis != "z") refuse(option, text, "y or z");

@@ -33,6 +33,7 @@ struct PictureOptions {
     std::string isa = "avx2";
     CameraParams camera;
     RenderParams render; ///< its background too, linear
+    bool compare_full = false;
 };
 
 struct RevealOptions {
@@ -78,6 +79,8 @@ struct CheckOptions {
 [[nodiscard]] double parse_units(const std::string& text, const std::string& option); ///< "mm", "in", "0.01": metres
 [[nodiscard]] std::uint64_t parse_bytes(const std::string& text, const std::string& option); ///< "512M", "4G"
 [[nodiscard]] Vec3d parse_vector(const std::string& text, const std::string& option);        ///< "1,2,3"
-[[nodiscard]] char parse_up(const std::string& text, const std::string& option);             ///< "y", "+Z"
+[[nodiscard]] std::vector<Vec2f> parse_guides(const std::string& text,
+                                              const std::string& option);        ///< "0,0 1,0 0.5,1"
+[[nodiscard]] char parse_up(const std::string& text, const std::string& option); ///< "y", "+Z"
 
 } // namespace porthole::cli

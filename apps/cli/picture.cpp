@@ -1,5 +1,7 @@
 #include "picture.h"
 
+#include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <system_error>
 #include <unistd.h>
@@ -9,6 +11,7 @@
 #include "porthole/base/tone.h"
 #include "porthole/io/files.h"
 #include "porthole/io/image_file.h"
+#include "porthole/report_fields.h"
 
 namespace porthole::cli {
 
@@ -100,6 +103,26 @@ void write_picture(const Frame& frame, const PictureOptions& options, PictureRep
     const fs::path folder = beside ? fs::absolute(options.report_path).parent_path() : fs::current_path();
     report.file =
         fs::absolute(options.output).lexically_normal().lexically_proximate(folder.lexically_normal()).string();
+}
+
+std::string summary(const RefinementReport& report, Refine refine) {
+    const Refinement& r = report.figures;
+    const auto number = [](const char* format, double value) {
+        char text[32];
+        std::snprintf(text, sizeof text, format, value);
+        return std::string(text);
+    };
+    const auto percent = [&](std::int64_t n) {
+        return number("%.4g %%", r.pixels ? 100 * double(n) / double(r.pixels) : 0.0);
+    };
+    const std::string quality = std::isfinite(r.psnr_db()) ? number("%.1f dB", r.psnr_db()) : "the same picture";
+    return std::string(fields::name_of(refine)) + " against full: " + percent(r.traced) + " of the pixels traced, " +
+           with_commas(r.rays.all()) + " rays of " + with_commas(r.full_rays.all()) + ", " + quality + ", " +
+           with_commas(r.wrong_ids) + (r.wrong_ids == 1 ? " wrong id (" : " wrong ids (") + percent(r.wrong_ids) +
+           "), " + with_commas(std::int64_t(report.missed_parts.size())) +
+           (report.missed_parts.size() == 1 ? " part missed, " : " parts missed, ") + number("%.2f", report.time.cpu) +
+           " CPU-s of " + number("%.2f", report.full_time.cpu) + ", " + in_seconds(report.time.wall) + " of " +
+           in_seconds(report.full_time.wall);
 }
 
 void write_report(const Report& report, const PictureOptions& options) {

@@ -28,6 +28,9 @@ void check_outputs(const PictureOptions& options, std::uint64_t max_memory);
 /// @throws Error output E08xx.
 void write_picture(const Frame& frame, const PictureOptions& options, PictureReport& report, const Control& control);
 
+/// One line on how a refined picture compares with the full one.
+[[nodiscard]] std::string summary(const RefinementReport& report, Refine refine);
+
 /// The report to --report and --json, whichever were asked for. @throws Error output E08xx.
 void write_report(const Report& report, const PictureOptions& options);
 

@@ -10,6 +10,8 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     const Stopwatch total;
     const PictureOptions& picture = options.picture;
     check_outputs(picture, memory_limit(options.common));
+    if (picture.compare_full && options.mode == RenderOptions::Mode::wireframe)
+        throw Error(ErrorKind::usage, "E0105", "--compare-full", "a wireframe has no pixels to infer");
     const Scene scene = load(options.common, out, control);
     require_parts(scene);
     ModelDigest digest = digest_model(options.common, picture, control);
@@ -29,10 +31,11 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     out.progress("render", 0);
     RevealParams params;
     params.render = picture.render;
+    params.compare_full = picture.compare_full;
     params.wire = options.wire;
     if (options.mode == RenderOptions::Mode::flat) params.render.shading = Shading::flat;
     if (options.mode != RenderOptions::Mode::wireframe) params.wire.wire = Wire::none;
-    const Frame frame = render_plain(meshes, whole, view, params, control);
+    const Frame frame = render_plain(meshes, whole, view, params, control, &report.refinement);
     report.run.render = drawing.seconds();
 
     const Stopwatch writing;
@@ -46,12 +49,14 @@ int run_render(const RenderOptions& options, Output& out, const Control& control
     report.view = view;
     report.options.render = params.render;
     report.options.wire = params.wire;
+    report.options.compare_full = params.compare_full;
     report.nothing_to_cut = true;
     report.frame_rays = frame.rays;
     report.run.threads = thread_count(control);
     report.run.total = total.seconds();
     fill_report(report, "render", scene, options.common, picture, std::move(digest));
     write_report(report, picture);
+    if (report.refinement) out.info(summary(*report.refinement, params.render.refine));
     return kExitDone;
 }
 

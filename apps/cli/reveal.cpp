@@ -101,6 +101,7 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
     params.plan.solidity.solid = select_and_tell(scene, options.solid, "--solid", out);
     params.plan.solidity.shell = select_and_tell(scene, options.shell, "--shell", out);
     params.render = picture.render;
+    params.compare_full = picture.compare_full;
 
     const Stopwatch building;
     out.progress("build", 0);
@@ -130,6 +131,7 @@ int run_reveal(const RevealOptions& options, Output& out, const Control& control
         return kExitNothingRevealed;
     }
     out.info(summary(report, revealed.plan.ghost) + ", " + in_seconds(report.run.total));
+    if (report.refinement) out.info(summary(*report.refinement, params.render.refine));
     return options.strict && opened < report.targets.size() ? kExitNothingRevealed : kExitDone;
 }
 

@@ -315,9 +315,9 @@ void check_render(const MeshBvhs& meshes, const Report& reported, const CheckPar
                   Checked& checked, const Control& control) {
     const View& view = *reported.options.view;
     const Bvh whole = build_bvh(meshes, all_parts(meshes.scene()));
-    const Frame frame = render_plain(meshes, whole, view, reported.options, control);
-    if (params.picture) compare_picture(params, view, {}, nullptr, frame, frame, false, comparison, checked);
     Report found;
+    const Frame frame = render_plain(meshes, whole, view, reported.options, control, &found.refinement);
+    if (params.picture) compare_picture(params, view, {}, nullptr, frame, frame, false, comparison, checked);
     found.model.parts = std::int64_t(meshes.scene().parts.size());
     found.model.triangles = std::int64_t(triangle_count(meshes.scene()));
     found.view = view;

@@ -22,7 +22,8 @@ struct RevealParams {
     std::optional<View> view{}; ///< instead of camera, width and height: this very view
     PlanParams plan;
     RenderParams render;
-    WireParams wire; ///< of a picture without a hole: edges instead of surfaces
+    WireParams wire;           ///< of a picture without a hole: edges instead of surfaces
+    bool compare_full = false; ///< draw it again with every pixel traced, and report how the two compare
 };
 
 } // namespace porthole

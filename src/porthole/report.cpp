@@ -231,11 +231,7 @@ Report measure(const Subject& subject, const ViewPlan& plan, const Bvh& bvh, con
     report.picture = measure_picture(subject, plan, before, after, control);
     report.plan_rays = plan.rays;
     report.frame_rays = before.rays;
-    report.frame_rays.primary += plan.cut.empty() ? 0 : after.rays.primary;
-    report.frame_rays.shadow += plan.cut.empty() ? 0 : after.rays.shadow;
-    report.frame_rays.ambient += plan.cut.empty() ? 0 : after.rays.ambient;
-    report.frame_rays.reflection += plan.cut.empty() ? 0 : after.rays.reflection;
-    report.frame_rays.refraction += plan.cut.empty() ? 0 : after.rays.refraction;
+    if (!plan.cut.empty()) report.frame_rays += after.rays;
     return report;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "porthole/params.h"
+#include "porthole/render/compare.h"
 
 namespace porthole {
 
@@ -80,6 +81,16 @@ struct PictureReport {
     bool no_background = false; ///< alpha in the file
 };
 
+/// A refined picture against the same one with every pixel traced.
+struct RefinementReport {
+    struct Seconds {
+        double wall = 0, cpu = 0; ///< cpu: of all threads of the process
+    };
+    Refinement figures;
+    std::vector<std::string> missed_parts; ///< paths
+    Seconds time, full_time;               ///< of drawing the two; they differ between runs
+};
+
 struct RunReport {
     double load = 0, build = 0, plan = 0, render = 0, write = 0, total = 0; ///< seconds
     int threads = 0;
@@ -101,6 +112,8 @@ struct Report {
     PictureReport picture;
     ViewPlan::Rays plan_rays;
     RayCounts frame_rays;
+    std::int64_t measuring_rays = 0; ///< for the ids of pixels that the picture inferred
+    std::optional<RefinementReport> refinement;
     Warnings warnings;
     RunReport run; ///< all that may differ between two runs
 };

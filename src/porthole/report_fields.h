@@ -118,6 +118,14 @@ inline const char* name_of(Refine refine) {
     return nullptr;
 }
 
+inline const char* name_of(RefineParams::Surface surface) {
+    switch (surface) {
+    case RefineParams::Surface::part: return "part";
+    case RefineParams::Surface::face: return "face";
+    }
+    return nullptr;
+}
+
 /// `Params`, const or not.
 template <typename T, typename Params>
 concept Is = std::is_same_v<std::remove_const_t<T>, Params>;
@@ -140,14 +148,19 @@ template <Is<PlanParams> T, typename Visit> void for_each(T& params, Visit&& vis
 }
 
 template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
-    auto& [samples, uniform, ao_samples, shadows, max_bounces, refine, shading, emphasis, lines, cap, cap_tint, rim_px,
-           background] = params;
+    auto& [samples, uniform, ao_samples, shadows, max_bounces, refine, refine_by, shading, emphasis, lines, cap,
+           cap_tint, rim_px, background] = params;
     visit("samples", samples);
     visit("uniform", uniform);
     visit("ao_samples", ao_samples);
     visit("shadows", shadows);
     visit("max_bounces", max_bounces);
     visit("refine", refine);
+    auto& [macro_px, threshold_px, surface, guides] = refine_by;
+    visit("macro_px", macro_px);
+    visit("threshold_px", threshold_px);
+    visit("surface", surface);
+    visit("guides", guides);
     visit("shading", shading);
     visit("emphasis", emphasis);
     visit("cap", cap);
@@ -158,7 +171,8 @@ template <Is<RenderParams> T, typename Visit> void for_each(T& params, Visit&& v
 }
 
 template <Is<RevealParams> T, typename Visit> void for_each(T& params, Visit&& visit) {
-    auto& [targets, keep, cut_only, keep_see_through, rest, camera, width, height, view, plan, render, wire] = params;
+    auto& [targets, keep, cut_only, keep_see_through, rest, camera, width, height, view, plan, render, wire,
+           compare_full] = params;
     (void)camera, (void)width, (void)height, (void)view; // the report's camera and size say where from
     visit("targets", targets);
     visit("keep", keep);
@@ -170,6 +184,7 @@ template <Is<RevealParams> T, typename Visit> void for_each(T& params, Visit&& v
     visit("wire", wire.wire);
     visit("hidden_lines", wire.hidden);
     visit("wire_px", wire.width_px);
+    visit("compare_full", compare_full);
 }
 
 } // namespace porthole::fields

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "porthole/report.h"
@@ -20,6 +21,23 @@ Json json_of(const PixelRuns& runs) {
 
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
+Json json_of(const RayCounts& rays) {
+    return {{"primary", rays.primary},       {"shadow", rays.shadow},         {"ambient", rays.ambient},
+            {"reflection", rays.reflection}, {"refraction", rays.refraction}, {"all", rays.all()}};
+}
+
+Json json_of(const RefinementReport& report) {
+    const Refinement& r = report.figures;
+    const auto share = [&](std::int64_t n) { return r.pixels ? Json(double(n) / double(r.pixels)) : Json(nullptr); };
+    return {{"rays", json_of(r.rays)},
+            {"full_rays", json_of(r.full_rays)},
+            {"traced_share", share(r.traced)},
+            {"wrong_ids", r.wrong_ids},
+            {"wrong_ids_share", share(r.wrong_ids)},
+            {"missed_parts", report.missed_parts},
+            {"psnr_db", std::isfinite(r.psnr_db()) ? Json(r.psnr_db()) : Json(nullptr)}};
+}
+
 /// Writes the fields of `options`.
 struct FieldWriter {
     const Report& report;
@@ -37,6 +55,11 @@ struct FieldWriter {
         return v ? Json{v->value, fields::name_of(v->unit)} : Json(nullptr);
     }
     Json json(const std::optional<double>& v) const { return v ? Json(*v) : Json(nullptr); }
+    Json json(const std::vector<Vec2f>& positions) const {
+        Json pairs = Json::array();
+        for (const Vec2f p : positions) pairs.push_back({p.x, p.y});
+        return pairs;
+    }
     Json json(const std::vector<PartId>& ids) const {
         Json parts = Json::array();
         for (const PartId id : ids) {
@@ -205,9 +228,9 @@ std::string to_json(const Report& report) {
 
     const ViewPlan::Rays& r = report.plan_rays;
     const RayCounts& f = report.frame_rays;
-    const std::int64_t primary =
-        f.primary + r.targets + r.alone + r.enclosing + r.spans + r.loose + r.paper_step1 + r.paper_step2;
-    const std::int64_t all = primary + f.shadow + f.ambient + f.reflection + f.refraction;
+    const std::int64_t primary = f.primary + report.measuring_rays + r.targets + r.alone + r.enclosing + r.spans +
+                                 r.loose + r.paper_step1 + r.paper_step2;
+    const std::int64_t all = primary + f.all() - f.primary;
     j["rays"] = {{"targets", r.targets},
                  {"targets_alone", r.alone},
                  {"spans", r.spans},
@@ -216,11 +239,13 @@ std::string to_json(const Report& report) {
                  {"paper_step1", r.paper_step1},
                  {"paper_step2", r.paper_step2},
                  {"primary", f.primary},
+                 {"measuring", report.measuring_rays},
                  {"shadow", f.shadow},
                  {"ambient", f.ambient},
                  {"reflection", f.reflection},
                  {"refraction", f.refraction},
                  {"primary_share", all ? Json(double(primary) / double(all)) : Json(nullptr)}};
+    j["refinement"] = report.refinement ? json_of(*report.refinement) : Json(nullptr);
 
     Json warnings = Json::array();
     for (const Warning& w : report.warnings)
@@ -237,6 +262,10 @@ std::string to_json(const Report& report) {
                 {"threads", run.threads},
                 {"isa", run.isa},
                 {"peak_bytes", run.peak_bytes}};
+    if (const std::optional<RefinementReport>& refined = report.refinement)
+        j["run"]["refinement_seconds"] = {
+            {"refined", {{"wall", refined->time.wall}, {"cpu", refined->time.cpu}}},
+            {"full", {{"wall", refined->full_time.wall}, {"cpu", refined->full_time.cpu}}}};
     return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -120,6 +120,14 @@ struct FieldReader {
         v.reset();
         if (!node.is_null()) v = node.number(-1e300, 1e300);
     }
+    static void read(const Node& node, std::vector<Vec2f>& v) {
+        v.clear();
+        for (std::size_t i = 0; i < node.size(); ++i) {
+            const Node pair = node.at(i);
+            if (pair.size() != 2) pair.refuse("two numbers");
+            v.push_back({float(pair.at(0).number(-1e30, 1e30)), float(pair.at(1).number(-1e30, 1e30))});
+        }
+    }
     void read(const Node& node, std::vector<PartId>& v) const {
         v.clear();
         for (std::size_t i = 0; i < node.size(); ++i) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
+#include <functional>
 #include <optional>
 
 #include "porthole/crumbs.h"
@@ -10,6 +12,30 @@
 namespace porthole {
 
 namespace {
+
+/// Draws by `draw`, which gives the picture and all its rays; if `compare`, once more with every pixel
+/// traced, and says in `refinement` how the two compare.
+Frame draw_compared(const Scene& scene, const RenderParams& look, bool compare,
+                    const std::function<std::pair<Frame, RayCounts>(const RenderParams&)>& draw,
+                    std::optional<RefinementReport>& refinement) {
+    if (!compare) return draw(look).first;
+    const auto timed = [&](const RenderParams& by, RefinementReport::Seconds& seconds) {
+        const auto start = std::chrono::steady_clock::now();
+        const std::clock_t cpu = std::clock();
+        auto drawn = draw(by);
+        seconds.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        seconds.cpu = double(std::clock() - cpu) / CLOCKS_PER_SEC;
+        return drawn;
+    };
+    RefinementReport report;
+    auto [frame, rays] = timed(look, report.time);
+    const auto [full, full_rays] = timed(full_of(look), report.full_time);
+    report.figures = compare_frames(frame, full, look.background);
+    report.figures.rays = rays, report.figures.full_rays = full_rays;
+    for (const PartId id : report.figures.missed) report.missed_parts.push_back(scene.parts[index(id)].path);
+    refinement = std::move(report);
+    return std::move(frame);
+}
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -39,19 +65,24 @@ std::vector<std::uint8_t> rest_of(const Scene& scene, const RevealParams& params
     return rest;
 }
 
-/// The pictures of a plan. The plain one is `around` the hole; the hole is drawn over it, so
-/// nothing changes outside.
+struct Pictures {
+    Frame plain; ///< around the hole; empty if the plan is a ghost
+    Frame frame;
+};
+
+/// The pictures of a plan. The hole is drawn over the plain one, so nothing changes outside.
 /// @param whole   hierarchy of all that is solid.
 /// @param opened  the same with the roles of the plan's cut.
-Frame draw(const ViewPlan& plan, const Bvh& whole, const Bvh& opened, const Bvh& targets, const Caps& caps,
-           const RenderParams& look, Frame* around, const Control& control) {
+Pictures draw(const ViewPlan& plan, const Bvh& whole, const Bvh& opened, const Bvh& targets, const Caps& caps,
+              const RenderParams& look, const Control& control) {
     if (plan.ghost && !plan.nothing_to_cut())
-        return render(whole, &targets, plan.view, look, nullptr, nullptr, control);
-    Frame plain = render_around(whole, plan.view, look, plan.cut, control);
-    Frame frame =
-        plan.nothing_to_cut() ? plain : render(opened, &targets, plan.view, look, &plan.cut, &plain, control, &caps);
-    if (around) *around = std::move(plain);
-    return frame;
+        return {{}, render(whole, &targets, plan.view, look, nullptr, nullptr, control)};
+    Pictures drawn;
+    drawn.plain = render_around(whole, plan.view, look, plan.cut, control);
+    drawn.frame = plan.nothing_to_cut()
+                      ? drawn.plain
+                      : render(opened, &targets, plan.view, look, &plan.cut, &drawn.plain, control, &caps);
+    return drawn;
 }
 
 } // namespace
@@ -63,15 +94,23 @@ Subject make_subject(const MeshBvhs& meshes, const RevealParams& params, const C
 RenderParams look_of(const RevealParams& params) {
     RenderParams look = params.render;
     if (params.plan.style == HoleStyle::paper) look.shading = Shading::flat;
+    if (is_selective(look.refine)) look.samples = 1;
     return look;
 }
 
 Frame render_plain(const MeshBvhs& meshes, const Bvh& whole, const View& view, const RevealParams& params,
-                   const Control& control) {
+                   const Control& control, std::optional<RefinementReport>* refinement) {
     const RenderParams look = look_of(params);
     if (params.wire.wire != Wire::none)
         return render_wireframe(meshes, all_parts(meshes.scene()), view, params.wire, look.background, control);
-    return render(whole, nullptr, view, look, nullptr, nullptr, control);
+    const auto draw_by = [&](const RenderParams& by) {
+        Frame frame = render(whole, nullptr, view, by, nullptr, nullptr, control);
+        const RayCounts rays = frame.rays;
+        return std::pair{std::move(frame), rays};
+    };
+    std::optional<RefinementReport> ignored;
+    return draw_compared(meshes.scene(), look, params.compare_full && refinement, draw_by,
+                         refinement ? *refinement : ignored);
 }
 
 Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Control& control) {
@@ -112,6 +151,8 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
     const Bvh targets = build_bvh(meshes, plan.opened);
     Frame plain;
     Caps caps;
+    std::optional<RefinementReport> refinement;
+    std::int64_t measuring_rays = 0;
     if (plan.nothing_revealed() || !shell.empty())
         plain.ids = trace_ids(subject.whole, view, view.window(), control, &plain.rays.primary);
     if (!plan.nothing_revealed()) {
@@ -127,16 +168,29 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
         Bvh& inside = solid_opened ? *solid_opened : opened;
         if (has_caps) caps = remove_crumbs(subject, plan, opened, targets, control);
         add_caps(inside, caps.mesh);
-        revealed.frame = draw(plan, around, inside, targets, caps, look, solid ? nullptr : &plain, control);
         const bool cut = !plan.ghost && !plan.nothing_to_cut();
-        const Drawn drawn{cut ? inside : around, &targets, cut ? &plan.cut : nullptr,
-                          cut ? &caps : nullptr, view,     look};
-        restyle(revealed.frame, drawn, rest, params.rest, control);
-        if (!shell.empty()) lay_shell(revealed.frame, drawn, build_bvh(meshes, shell), control);
+        const auto draw_by = [&](const RenderParams& by) {
+            auto [around_hole, frame] = draw(plan, around, inside, targets, caps, by, control);
+            const Drawn drawn{cut ? inside : around, &targets, cut ? &plan.cut : nullptr,
+                              cut ? &caps : nullptr, view,     by};
+            restyle(frame, drawn, rest, params.rest, control);
+            if (!shell.empty()) lay_shell(frame, drawn, build_bvh(meshes, shell), control);
+            RayCounts rays = frame.rays;
+            if (cut) rays += around_hole.rays;
+            // What is compared and measured is the first one drawn.
+            if (!solid && plain.ids.window().empty()) plain = std::move(around_hole);
+            return std::pair{std::move(frame), rays};
+        };
+        revealed.frame = draw_compared(scene, look, params.compare_full, draw_by, refinement);
+        revealed.inferred = revealed.frame.inferred;
+        measuring_rays = trace_inferred_ids(around, view, revealed.frame, control) +
+                         trace_inferred_ids(around, view, plain, control);
     }
     const double rendered = seconds_since(start) - planned;
 
     revealed.report = measure(subject, plan, opened, plain, plan.nothing_revealed() ? plain : revealed.frame, control);
+    revealed.report.measuring_rays = measuring_rays;
+    revealed.report.refinement = std::move(refinement);
     set_options(revealed.report, scene, params);
     revealed.report.options.view = view;
     revealed.report.camera = is_auto(params.camera)         ? "auto"

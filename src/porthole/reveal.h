@@ -8,7 +8,8 @@ namespace porthole {
 
 struct Revealed {
     ViewPlan plan;
-    Frame frame;   ///< empty if nothing was revealed
+    Frame frame;   ///< empty if nothing was revealed; its ids are all traced
+    Mask inferred; ///< of the frame as it was drawn: 1 where ids were inferred; empty: nowhere
     Report report; ///< without version, command, model_path, load, write and total seconds
 };
 
@@ -20,8 +21,10 @@ struct Revealed {
 
 /// The plain picture, or the wireframe, that `params` ask for: no hole.
 /// @param whole  every part. @throws Error as render() and render_wireframe().
+/// @param refinement  if given, and if `params` ask for it: how it compares with every pixel traced. A
+///                    wireframe compares with nothing.
 [[nodiscard]] Frame render_plain(const MeshBvhs& meshes, const Bvh& whole, const View& view, const RevealParams& params,
-                                 const Control& control = {});
+                                 const Control& control = {}, std::optional<RefinementReport>* refinement = nullptr);
 
 /// Opens a hole around the targets in whatever hides them and draws the picture.
 ///

@@ -8,13 +8,6 @@ constexpr int kLightMargin = 3; ///< pixels around the hole whose light is neede
 
 int block_floor(int v) { return v & ~(kCell - 1); }
 
-bool near_hole(const Cut& cut, int x, int y, int reach) {
-    for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx)
-            if (cut.distance.at_or(x + dx, y + dy, 1.0f) <= 0) return true;
-    return false;
-}
-
 bool is_covered(const Picture& picture, int x, int y) { return picture.covered.at_or(x, y, 0) != 0; }
 
 std::uint16_t quantised(float value, float unit) {
@@ -52,22 +45,9 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
     for (int i = 0; i < kLanes; ++i) {
         if (!samples.active[i]) continue;
         const int x = bx + i % kCell, y = by + i / kCell;
-        Pixel& pixel = buffer.pixels(x, y);
-        if (seen.in_hole[i]) pixel.flags |= Pixel::in_hole;
-        if (seen.on_target[i]) pixel.flags |= Pixel::on_target;
-        const Hit& hit = seen.hit[i];
-        buffer.ids.id(x, y) = hit.part;
-        buffer.ids.depth(x, y) = seen.depth[i];
-        if (!hit.any() || !pixel.has(Pixel::traced)) continue;
-        pixel.triangle = hit.triangle, pixel.u = hit.u, pixel.v = hit.v;
-        const SurfacePoint point =
-            picture.camera.surface(placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
-        if (hit.cap) pixel.flags |= Pixel::cap;
-        const Cut* cut = picture.camera.cut();
-        if (seen.in_hole[i] && !point.front && cut->role[index(hit.part)] == CutRole::cut_set &&
-            cut->cap_of(hit.part) == CapRule::none)
-            pixel.flags |= Pixel::open_back;
-        pixel.normal = pack_normal(point.normal);
+        const std::optional<SurfacePoint> found = record(picture, placements, samples, seen, i, x, y);
+        if (!found) continue;
+        const SurfacePoint& point = *found;
         points[n] = {point.position, point.start, point.flat_normal, point.normal, seen.in_hole[i], cell_rank(x, y)};
         pixels[n++] = {x, y};
     }
@@ -111,6 +91,34 @@ void RayTotals::add(const RayCounts& rays) {
 }
 
 RayCounts RayTotals::get() const { return {primary_, shadow_, ambient_, reflection_, refraction_}; }
+
+bool near_hole(const Cut& cut, int x, int y, int reach) {
+    for (int dy = -reach; dy <= reach; ++dy)
+        for (int dx = -reach; dx <= reach; ++dx)
+            if (cut.distance.at_or(x + dx, y + dy, 1.0f) <= 0) return true;
+    return false;
+}
+
+std::optional<SurfacePoint> record(Picture& picture, const std::vector<Placement>& placements, const Samples16& samples,
+                                   const Seen16& seen, int lane, int x, int y) {
+    Pixel& pixel = picture.buffer.pixels(x, y);
+    if (seen.in_hole[lane]) pixel.flags |= Pixel::in_hole;
+    if (seen.on_target[lane]) pixel.flags |= Pixel::on_target;
+    const Hit& hit = seen.hit[lane];
+    picture.buffer.ids.id(x, y) = hit.part;
+    picture.buffer.ids.depth(x, y) = seen.depth[lane];
+    if (!hit.any() || !pixel.has(Pixel::traced)) return std::nullopt;
+    pixel.triangle = hit.triangle, pixel.u = hit.u, pixel.v = hit.v;
+    const SurfacePoint point = picture.camera.surface(placements, hit, samples.x[lane], samples.y[lane],
+                                                      seen.depth[lane], seen.direction[lane]);
+    if (hit.cap) pixel.flags |= Pixel::cap;
+    const Cut* cut = picture.camera.cut();
+    if (seen.in_hole[lane] && !point.front && cut->role[index(hit.part)] == CutRole::cut_set &&
+        cut->cap_of(hit.part) == CapRule::none)
+        pixel.flags |= Pixel::open_back;
+    pixel.normal = pack_normal(point.normal);
+    return point;
+}
 
 void mark_everything(Picture& picture, const Cut* cut) {
     for (Pixel& pixel : picture.buffer.pixels.pixels()) pixel.flags = Pixel::traced;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <optional>
 
 #include "porthole/render/filter.h"
 #include "porthole/render/gbuffer.h"
@@ -30,6 +31,8 @@ struct Picture {
     Mask edges;         ///< not 0 where the first sample is not enough: see find_edges()
     Mask covered;       ///< 1 where only the ids are wanted; empty: nowhere
     Mask opened;        ///< with a cut: 1 where some sample is in the hole
+    Mask known;         ///< of the paper's refinement: 1 where the first sample is traced, whether shaded or not
+    Mask inferred;      ///< 1 where the ids were not traced; empty: nowhere
     RayTotals rays;
 
     Picture(const View& seen, const RenderParams& how, const Camera& by, Rect window)
@@ -51,6 +54,14 @@ void mark_hole(Picture& picture, const Cut& cut);
 /// rays. Fastest when blocks that follow each other lie close.
 void gather_blocks(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements,
                    std::span<const Vec2i> blocks, bool light);
+
+/// Writes what lane `lane` of `seen` saw at pixel (x, y) of the buffer.
+/// @return the point; nothing where nothing is hit or only the ids are wanted.
+std::optional<SurfacePoint> record(Picture& picture, const std::vector<Placement>& placements, const Samples16& samples,
+                                   const Seen16& seen, int lane, int x, int y);
+
+/// Whether the hole covers a pixel centre at most `reach` pixels away in x and y.
+[[nodiscard]] bool near_hole(const Cut& cut, int x, int y, int reach);
 
 /// Pass 1: camera rays through the pixel centres, their shadow and ambient rays.
 void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile);

@@ -10,10 +10,31 @@
 #include "porthole/render/emphasis.h"
 #include "porthole/render/linework.h"
 #include "porthole/render/picture.h"
+#include "porthole/render/selective.h"
 
 namespace porthole {
 
 namespace {
+
+void check(const RefineParams& p) {
+    const auto power_of_two = [](const char* name, int value, int high) {
+        if (value >= 1 && value <= high && (value & (value - 1)) == 0) return;
+        throw Error(ErrorKind::usage, "E0140", name,
+                    std::to_string(value) + " is not a power of two from 1 to " + std::to_string(high));
+    };
+    power_of_two("macro_px", p.macro_px, 256);
+    power_of_two("threshold_px", p.threshold_px, p.macro_px);
+    const auto refuse = [](const char* reason) { throw Error(ErrorKind::usage, "E0140", "guides", reason); };
+    const std::vector<Vec2f>& g = p.guides;
+    if (g.size() < 3 || g.size() > 64) refuse("3 to 64 are needed");
+    bool spread = false;
+    for (const Vec2f a : g) {
+        if (!(a.x >= 0 && a.x <= 1 && a.y >= 0 && a.y <= 1)) refuse("one lies outside 0..1");
+        for (const Vec2f b : g)
+            spread |= std::abs((a.x - g[0].x) * (b.y - g[0].y) - (b.x - g[0].x) * (a.y - g[0].y)) > 1e-6f;
+    }
+    if (!spread) refuse("all lie on one line");
+}
 
 void check(const RenderParams& p) {
     const auto in_range = [](const char* name, int value, int low, int high) {
@@ -25,6 +46,7 @@ void check(const RenderParams& p) {
     in_range("ao_samples", p.ao_samples, 0, 256);
     in_range("max_bounces", p.max_bounces, 0, 64);
     if (!(p.rim_px >= 0) || !(p.rim_px <= 100)) throw Error(ErrorKind::usage, "E0140", "rim_px", "outside 0..100");
+    check(p.refine_by);
 }
 
 /// Runs one pass over all tiles and reports its share of the work.
@@ -71,19 +93,26 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     Passes passes(picture.buffer.window(), control);
     std::vector<Tint> tints;
     const Stage stage{scene, bvh, cut, params, lighting, occlusion, placements, tints};
+    const bool selective = is_selective(params.refine);
     std::optional<BlockMap> map;
     if (params.refine == Refine::adaptive) {
         // Where more than colours is looked at, what each pixel sees is traced.
         const bool everything = !cut && !targets && params.lines != Lines::all;
         map = gather_adaptive(picture, stage, everything, control);
         passes.pass(0.5);
+    } else if (selective) {
+        passes.run(0.3, [&](Rect tile) { look_tile(picture, placements, tile); });
     } else {
         passes.run(0.5, [&](Rect tile) { gather_tile(picture, occlusion, placements, tile); });
     }
     if (targets) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
-    passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
-    if (map) passes.run(0, [&](Rect tile) { infer_colors(picture, *map, tile); });
-    if (params.samples > 1) {
+    if (selective) {
+        draw_selectively(picture, stage, control);
+    } else {
+        passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
+        if (map) passes.run(0, [&](Rect tile) { infer_colors(picture, *map, tile); });
+    }
+    if (params.samples > 1 && !selective) {
         passes.run(0.02, [&](Rect tile) {
             if (!map || map->is_busy(tile)) find_edges(picture, tile);
         });
@@ -111,9 +140,12 @@ Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const Ren
                  const Control& control) {
     const Camera camera(bvh, targets, view, nullptr);
     Picture picture(view, params, camera, view.window());
-    mark_everything(picture, covering);
+    // The paper's blocks reach under the hole: what is outside depends on what would be seen there.
+    mark_everything(picture, is_selective(params.refine) ? nullptr : covering);
+    if (is_selective(params.refine)) mark_known(picture, nullptr, covering, targets != nullptr);
     draw(picture, bvh, targets, nullptr, nullptr, control);
-    Frame frame{std::move(picture.color), std::move(picture.buffer.ids), {}, {}, picture.rays.get()};
+    Frame frame{
+        std::move(picture.color), std::move(picture.buffer.ids), {}, std::move(picture.inferred), picture.rays.get()};
     mark_inferred(picture, frame);
     return frame;
 }
@@ -123,11 +155,13 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
     Frame frame = under;
     frame.rays = {};
     frame.inside = Mask(view.window(), 0);
-    const Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
+    Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
     if (window.empty()) return frame;
+    if (is_selective(params.refine)) window = whole_macro_pixels(window, params.refine_by, view);
     const Camera camera(bvh, targets, view, &cut, caps);
     Picture picture(view, params, camera, window);
     mark_hole(picture, cut);
+    if (is_selective(params.refine)) mark_known(picture, &cut, nullptr, true);
     draw(picture, bvh, targets, &cut, &under.ids, control);
     // Only pixels with a sample in the hole change; the others stay the plain picture's.
     for (int y = window.y0; y < window.y1; ++y)
@@ -138,6 +172,7 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
             if (!pixel.has(Pixel::in_hole)) continue;
             frame.ids.id(x, y) = picture.buffer.ids.id(x, y);
             frame.ids.depth(x, y) = picture.buffer.ids.depth(x, y);
+            if (!frame.inferred.empty()) frame.inferred(x, y) = 0;
             frame.inside(x, y) = pixel.has(Pixel::cap)         ? std::uint8_t(Frame::cap)
                                  : pixel.has(Pixel::open_back) ? std::uint8_t(Frame::open_back)
                                                                : std::uint8_t{0};

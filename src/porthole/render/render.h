@@ -27,6 +27,25 @@ enum class Refine : std::uint8_t {
     expansion ///< selective expansion: blocks that a first sampling hits, grown until nothing new is hit
 };
 
+/// Whether pixels are traced as the paper does: one ray at the centre of each, whatever the samples.
+[[nodiscard]] constexpr bool is_selective(Refine refine) {
+    return refine == Refine::paper1 || refine == Refine::paper2 || refine == Refine::expansion;
+}
+
+/// How the paper's ways go about it.
+struct RefineParams {
+    enum class Surface : std::uint8_t {
+        part, ///< pixels see the same surface when they see the same part
+        face  ///< or the same triangle
+    };
+    int macro_px = 8;     ///< size of a macro pixel, a power of two, [1, 256]
+    int threshold_px = 1; ///< smallest block, not subdivided, a power of two, at most macro_px
+    Surface surface = Surface::part;
+    /// Of paper2: 3 to 64 positions in a block, from (0, 0), its first pixel, to (1, 1), its last one;
+    /// not all on one line.
+    std::vector<Vec2f> guides{{0, 0}, {1, 0}, {0, 1}, {1, 1}};
+};
+
 /// How the cut through solid material is drawn.
 enum class CapStyle : std::uint8_t {
     own,  ///< the part's colour, darker or greyer than its outside
@@ -47,6 +66,7 @@ struct RenderParams {
     bool shadows = true;
     int max_bounces = 6; ///< reflections, refractions and blended surfaces along one path, [0, 64]
     Refine refine = Refine::full;
+    RefineParams refine_by;
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
     Lines lines = Lines::rim;
@@ -60,6 +80,12 @@ struct RenderParams {
 
 struct RayCounts {
     std::int64_t primary = 0, shadow = 0, ambient = 0, reflection = 0, refraction = 0;
+    RayCounts& operator+=(const RayCounts& r) {
+        primary += r.primary, shadow += r.shadow, ambient += r.ambient;
+        reflection += r.reflection, refraction += r.refraction;
+        return *this;
+    }
+    [[nodiscard]] std::int64_t all() const { return primary + shadow + ambient + reflection + refraction; }
 };
 
 /// A rendered picture with its ids.
@@ -108,5 +134,12 @@ struct Frame {
 /// where the hole will cover it. Everywhere else the bits are those of the plain picture.
 [[nodiscard]] Frame render_around(const Bvh& bvh, const View& view, const RenderParams& params, const Cut& cut,
                                   const Control& control = {});
+
+/// Traces the ids of `frame` that were inferred, so that what is measured was traced; none are
+/// inferred then.
+/// @param bvh  what `frame` shows outside its hole: nothing is inferred inside.
+/// @return rays traced. @throws Cancelled. Cost: one coherent ray a pixel of the 4x4 blocks with
+///         inferred ones.
+std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, const Control& control = {});
 
 } // namespace porthole
