@@ -142,7 +142,7 @@ CutawayMargins cutaway_margins(const View& view, const PlanParams& params, const
     return {hole, hole + (params.shape == HoleShape::silhouette ? 0 : 2 * closing_radius_px(view))};
 }
 
-void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect whole,
+void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect around,
                   const IdBuffer& ids, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const float tolerance = subject.tolerance();
@@ -170,7 +170,7 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
     merge(plan.cut_set,
           trace_spans(subject.whole, kMaskCutSet, view, beside, tolerance, control, &plan.rays.spans).parts);
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
-    plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, plan.window, whole, control,
+    plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, around, plan.whole, control,
                                       plan.rays.enclosing);
 
     keep_clear(core, plan.target_ids.id, plan.enclosing, plan.depth_px);

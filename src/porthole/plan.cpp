@@ -13,6 +13,7 @@ namespace porthole {
 
 namespace {
 
+constexpr int kBeyondBand = 24; ///< pixels around the band that its distances and their smoothing read
 constexpr int kThinPixels = 16; ///< fewer pixel centres than this: sub-pixel samples decide
 
 /// Where `part` alone is seen; thin parts by sub-pixel samples.
@@ -157,6 +158,7 @@ struct Windows {
     Rect whole;       ///< the picture and the margin that the hole needs
     Rect all_targets; ///< the picture and the margin in which targets shape the hole
     Rect targets;     ///< where in it targets can be, and plan.window
+    Rect enclosing;   ///< where the enclosing object can matter to the hole
 };
 
 /// Ids of the opened targets in windows.targets.
@@ -196,7 +198,7 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
         plan.contours = find_contours(plan.target_ids.id);
     find_hiding_targets(plan.targets, plan.target_ids);
     if (params.style == HoleStyle::cutaway)
-        return plan_cutaway(subject, params, band, windows.whole, ids, plan, control);
+        return plan_cutaway(subject, params, band, windows.enclosing, ids, plan, control);
 
     // What lies in front of the targets is cut; the rest is loose.
     plan.spans =
@@ -204,8 +206,8 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     for (const PartSpan& span : plan.spans.parts) plan.cut_set.push_back(span.part);
     if (plan.cut_set.empty()) return;
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
-    plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, plan.window, windows.whole, control,
-                                      plan.rays.enclosing);
+    plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, windows.enclosing, windows.whole,
+                                      control, plan.rays.enclosing);
 
     Mask covered(plan.window, 0);
     for (std::size_t i = 0; i < covered.pixels().size(); ++i)
@@ -320,7 +322,11 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     for (const TargetView& target : plan.targets)
         if (!target.absent) plan.opened.push_back(target.part);
     const Rect touched = pixel_rect(blocks, windows.all_targets);
-    plan.window = touched.empty() ? Rect{} : touched.grown(margins.hole).intersected(windows.whole);
+    if (!touched.empty()) {
+        // The band is all that the hole adds to what the targets' pixels span, whatever their shape.
+        windows.enclosing = touched.grown(margins.hole).intersected(windows.whole);
+        plan.window = touched.grown(plan.depth_px + kBeyondBand).intersected(windows.whole);
+    }
     if (plan.opened.empty()) return plan;
     windows.targets = {std::min(touched.x0, plan.window.x0), std::min(touched.y0, plan.window.y0),
                        std::max(touched.x1, plan.window.x1), std::max(touched.y1, plan.window.y1)};

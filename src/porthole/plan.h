@@ -104,13 +104,13 @@ struct ViewPlan {
                         ///< the targets
     int depth_px = 0;   ///< width of the band asked for, or chosen
     Rect whole;         ///< picture and margin
-    Rect window;        ///< the part of picture and margin that the hole can touch; all images below
+    Rect window;        ///< the part of picture and margin that the hole can touch; all images below but `enclosing`
     std::vector<TargetView> targets; ///< in the order of Subject::targets
     std::vector<PartId> opened;      ///< targets neither absent nor refused
     IdBuffer target_ids;             ///< opened targets only
     Spans spans;                     ///< what lies in front of them
     std::vector<PartId> cut_set;     ///< parts that are cut, increasing
-    Mask enclosing;                  ///< E
+    Mask enclosing;                  ///< E, also around the window as far as it matters to the hole
     std::vector<Contour> contours;   ///< of the targets
     int closing_px = 0;              ///< style cutaway: radius by which the targets were closed
     IdBuffer core;                   ///< style cutaway: M, with the nearest target pixel's part and depth

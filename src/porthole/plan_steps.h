@@ -57,8 +57,8 @@ struct CutawayMargins {
 ///               plan.target_ids, contours and spans are made.
 /// @param most   with the widest band; around targets that are thin lines it is 3 % of the picture's
 ///               height, unless the user asked for a width.
-/// @param whole  picture and margin of the hole.
-void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect whole,
+/// @param around where the enclosing object can matter; a part of plan.whole.
+void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect around,
                   const IdBuffer& ids, ViewPlan& plan, const Control& control);
 
 } // namespace porthole

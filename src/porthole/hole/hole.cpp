@@ -24,8 +24,9 @@ void require(bool holds, const char* where, const std::string& reason) {
 void check(std::span<const Vec2i> contour, const IdBuffer& targets, const Mask& covered, const Mask& enclosing,
            const HoleParams& params) {
     const Rect w = targets.window();
-    require(targets.depth.window() == w && covered.window() == w && enclosing.window() == w, "grow_hole",
-            "the windows of targets, covered and enclosing differ");
+    require(targets.depth.window() == w && covered.window() == w, "grow_hole",
+            "the windows of targets and covered differ");
+    require(enclosing.window().intersected(w) == w, "grow_hole", "the window of enclosing does not hold the targets'");
     require(params.depth_px >= 1 && params.depth_px <= 4096, "depth_px",
             std::to_string(params.depth_px) + " is not in [1, 4096]");
     require(params.blur_px >= 0 && params.blur_px <= 4096, "blur_px",

@@ -83,7 +83,7 @@ using HitBeyond = std::function<bool(Vec2i)>;
 /// @param targets    ids and depths when only the targets are traced; or of a larger core, from
 ///                   fill_core: then that is what the band grows from and "target" means here.
 /// @param covered    1 at target pixels that an occluder hides; same window as `targets`.
-/// @param enclosing  E, from fill_enclosed; same window. Where it is 1 everywhere D is infinite.
+/// @param enclosing  E, from fill_enclosed; a window that holds the others'. Where it is 1 everywhere D is infinite.
 /// @return the hole in the same window; empty() if no target is in view.
 /// @throws Error usage E0120 if windows differ, a contour pixel is not a target's, or a parameter
 ///         is out of range.

@@ -88,8 +88,9 @@ void check(const PaperContours& contours, const IdBuffer& targets, const Mask& e
         if (!holds) throw Error(ErrorKind::usage, "E0120", where, reason);
     };
     const Rect w = targets.window();
-    require(enclosing.window() == w && (covered.empty() || covered.window() == w), "grow_hole_paper",
-            "the windows of targets, enclosing and covered differ");
+    require(covered.empty() || covered.window() == w, "grow_hole_paper", "the windows of targets and covered differ");
+    require(enclosing.window().intersected(w) == w, "grow_hole_paper",
+            "the window of enclosing does not hold the targets'");
     require(depth_px >= 1 && depth_px <= 4096, "depth_px", std::to_string(depth_px) + " is not in [1, 4096]");
     require(contours.ids.size() == contours.contours.size(), "grow_hole_paper", "a contour has no id");
     for (const Contour& contour : contours.contours)
