@@ -72,4 +72,60 @@ std::int64_t BareEmbree::trace(const View& view) const {
     return hits;
 }
 
+struct FlatEmbree::State {
+    RTCDevice device = nullptr;
+    RTCScene scene = nullptr;
+};
+
+FlatEmbree::FlatEmbree(const Scene& scene, std::span<const PartId> chosen) : state_(std::make_unique<State>()) {
+    state_->device = rtcNewDevice("isa=avx2");
+    state_->scene = rtcNewScene(state_->device);
+    rtcSetSceneFlags(state_->scene, RTC_SCENE_FLAG_ROBUST);
+    for (const PartId id : all_parts(scene)) {
+        const Mesh& mesh = scene.mesh_of(id);
+        const Affine3f place(scene.parts[index(id)].world_from_mesh);
+        const RTCGeometry g = rtcNewGeometry(state_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                      sizeof(Vec3f), mesh.positions.size()));
+        std::transform(mesh.positions.begin(), mesh.positions.end(), positions,
+                       [&](Vec3f p) { return place.point(p); });
+        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
+                                   sizeof(Vec3u), mesh.triangles.size());
+        rtcSetGeometryMask(g, std::find(chosen.begin(), chosen.end(), id) != chosen.end() ? kMaskFixed : kMaskCutSet);
+        rtcCommitGeometry(g);
+        rtcAttachGeometryByID(state_->scene, g, index(id));
+        rtcReleaseGeometry(g);
+    }
+    rtcCommitScene(state_->scene);
+}
+
+FlatEmbree::~FlatEmbree() {
+    rtcReleaseScene(state_->scene);
+    rtcReleaseDevice(state_->device);
+}
+
+std::vector<PartId> FlatEmbree::ids_at(const View& view, std::span<const Vec2i> pixels) const {
+    const FlushDenormals flush;
+    std::vector<PartId> ids(pixels.size(), kNoPart);
+    RayHit16 packet;
+    float x[kLanes] = {}, y[kLanes] = {}, depth_per_t[kLanes];
+    alignas(64) int valid[kLanes];
+    for (std::size_t first = 0; first < pixels.size(); first += kLanes) {
+        const int n = int(std::min<std::size_t>(kLanes, pixels.size() - first));
+        for (int i = 0; i < kLanes; ++i) {
+            valid[i] = i < n ? -1 : 0;
+            if (i >= n) continue;
+            x[i] = float(pixels[first + std::size_t(i)].x) + 0.5f;
+            y[i] = float(pixels[first + std::size_t(i)].y) + 0.5f;
+        }
+        set_rays(packet, depth_per_t, view, x, y, kMaskFixed);
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        rtcIntersect16(valid, state_->scene, &context, reinterpret_cast<RTCRayHit16*>(&packet));
+        for (int i = 0; i < n; ++i)
+            if (packet.geometry[i] != RTC_INVALID_GEOMETRY_ID) ids[first + std::size_t(i)] = PartId{packet.geometry[i]};
+    }
+    return ids;
+}
+
 } // namespace porthole::bench

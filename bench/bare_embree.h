@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "porthole/base/view.h"
 #include "porthole/scene/scene.h"
@@ -21,6 +23,24 @@ public:
 
     /// Traces every pixel centre of the view. @return number of hits
     [[nodiscard]] std::int64_t trace(const View& view) const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+/// What a ray tracer without instances has: one hierarchy over all triangles in the world, with a
+/// ray mask that is looked at when a triangle is met. Robust, AVX2.
+class FlatEmbree {
+public:
+    /// @param chosen  parts that rays of ids_at() can hit.
+    FlatEmbree(const Scene& scene, std::span<const PartId> chosen);
+    ~FlatEmbree();
+    FlatEmbree(const FlatEmbree&) = delete;
+    FlatEmbree& operator=(const FlatEmbree&) = delete;
+
+    /// The nearest chosen part at pixel centres, sixteen rays at a time.
+    [[nodiscard]] std::vector<PartId> ids_at(const View& view, std::span<const Vec2i> pixels) const;
 
 private:
     struct State;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <random>
 
+#include "bare_embree.h"
 #include "porthole/hole/contour.h"
 #include "porthole/io/load.h"
 #include "porthole/plan.h"
@@ -72,9 +73,12 @@ const Model& model(const Case& c) {
 struct Stage {
     Subject subject;
     View view;
+    FlatEmbree flat;
     std::vector<Vec2i> truth; ///< contour pixels of the full target id buffer
 
-    explicit Stage(const Case& c) : subject(make_subject(model(c).meshes, chosen(model(c).scene, c.targets))) {
+    explicit Stage(const Case& c)
+        : subject(make_subject(model(c).meshes, chosen(model(c).scene, c.targets))),
+          flat(model(c).scene, subject.targets) {
         const Scene& scene = model(c).scene;
         view = view_from_direction(frame_subject(scene, subject.targets), {1.0f, 0.8f, 1.0f}, {}, 1920, 1080);
         truth = contour_pixels(find_contours(trace_ids(subject.target_bvh, view, view.window()).id));
@@ -99,6 +103,13 @@ Found by_paper(const Stage& s, const Control&) {
     PaperContours paper = find_contours_paper(
         [&](std::span<const Vec2i> pixels) { return trace_ids_at(s.subject.whole, s.view, pixels, kMaskFixed); },
         s.view.window());
+    return {std::move(paper.contours), paper.step1_rays + paper.step2_rays};
+}
+
+/// The same where the scene is one flat hierarchy, so that the mask leaves out triangles, not parts.
+Found by_paper_flat(const Stage& s, const Control&) {
+    PaperContours paper = find_contours_paper(
+        [&](std::span<const Vec2i> pixels) { return s.flat.ids_at(s.view, pixels); }, s.view.window());
     return {std::move(paper.contours), paper.step1_rays + paper.step2_rays};
 }
 
@@ -139,6 +150,7 @@ void add_contour_benchmarks() {
         scenes.emplace_back("worm", models + "assembly/virtual_worm.glb");
     }
     const std::pair<const char*, Method> methods[] = {{"paper", by_paper},
+                                                      {"paper_flat", by_paper_flat},
                                                       {"full", by<ContourMethod::full>},
                                                       {"exact", by<ContourMethod::exact>},
                                                       {"fast", by<ContourMethod::fast>}};
