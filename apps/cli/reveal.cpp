@@ -33,7 +33,7 @@ void write_debug_pictures(const RevealOptions& options, const Revealed& revealed
     std::filesystem::create_directories(options.debug_dir, failed);
     if (failed) throw Error(ErrorKind::output, "E0801", options.debug_dir, "cannot be made: " + failed.message());
     const Frame* const after = revealed.plan.nothing_revealed() ? nullptr : &revealed.frame;
-    for (const NamedPicture& p : debug_pictures(revealed.plan, nullptr, after))
+    for (const NamedPicture& p : debug_pictures(revealed.plan, nullptr, after, &revealed.inferred))
         write_file((std::filesystem::path(options.debug_dir) / (p.name + ".png")).string(), encode_png(p.picture, 4),
                    options.picture.no_clobber);
 }

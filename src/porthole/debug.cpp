@@ -83,7 +83,8 @@ Image<Rgba8> drawn_inside(const Mask& inside) {
 
 } // namespace
 
-std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* before, const Frame* after) {
+std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* before, const Frame* after,
+                                         const Mask* inferred) {
     std::vector<NamedPicture> pictures;
     const auto add = [&](const std::string& name, Image<Rgba8> picture) {
         if (!picture.empty()) pictures.push_back({name, std::move(picture)});
@@ -116,6 +117,11 @@ std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* befo
     if (after) add("16-inside", drawn_inside(after->inside));
     if (after) add("14-parts-after", drawn_ids(after->ids.id));
     if (after) add("15-depth-after", drawn_depth(after->ids.depth));
+    if (inferred)
+        add("17-traced", drawn(*inferred, [](std::uint8_t v) {
+                const std::uint8_t grey = v ? 0 : 255;
+                return Rgba8{grey, grey, grey, 255};
+            }));
     return pictures;
 }
 

@@ -17,7 +17,8 @@ struct NamedPicture {
 /// Every value of the plan, in the order in which it was made, drawn over its own window:
 /// ids (a colour per part), depths (grey, near is light), masks (white), distances (blue
 /// inside, orange outside, a line every ten pixels). With frames, also their ids.
+/// @param inferred  Frame::inferred of the frame as it was drawn: drawn black, traced pixels white.
 [[nodiscard]] std::vector<NamedPicture> debug_pictures(const ViewPlan& plan, const Frame* before = nullptr,
-                                                       const Frame* after = nullptr);
+                                                       const Frame* after = nullptr, const Mask* inferred = nullptr);
 
 } // namespace porthole

@@ -34,6 +34,9 @@ class Usage(Case):
                       ("render", self.model, "--size", "-5x5"), ("render", self.model, "--background", "#12345"),
                       ("render", self.model, "--camera-direction", "1,2"), ("render", self.model, "--up", "w"),
                       ("render", self.model, "--units", "-1"), ("render", self.model, "--isa", "sse"),
+                      ("render", self.model, "--refine", "paper3"), ("render", self.model, "--guides", "0,0 1"),
+                      ("render", self.model, "--surface", "solid"),
+                      ("render", self.model, "--mode", "wireframe", "--compare-full"),
                       ("reveal", self.model, "--target", "inner", "--depth", "3furlongs"),
                       ("reveal", self.model, "--target", "inner", "--style", "baroque")],
             "E0106": [("render", self.model, "-o", self.path("o.gif")), ("render", self.model, "-o", self.path("noextension")),
@@ -45,6 +48,10 @@ class Usage(Case):
             "E0113": [("render", self.model, "--camera-zoom-factor", "0", "-o", out),
                       ("render", self.model, "--camera-view-angle", "nan", "-o", out),
                       ("render", self.model, "--camera-view-up", "0,0,0", "-o", out)],
+            "E0140": [("render", self.model, "--refine", "paper1", "--macro", "12", "-o", out),
+                      ("render", self.model, "--refine", "paper1", "--macro", "4", "--threshold", "8", "-o", out),
+                      ("render", self.model, "--refine", "paper2", "--guides", "0,0 1,1", "-o", out),
+                      ("render", self.model, "--refine", "paper2", "--guides", "0,0 1,0 2,1", "-o", out)],
         }.items():
             for arg in args:
                 with self.subTest(arg=arg):
@@ -160,6 +167,29 @@ class Outputs(Case):
         done = subprocess.run([harness.PROGRAM, "parts", self.model], stdout=writer, stderr=subprocess.PIPE)
         os.close(writer)
         self.assertEqual(done.returncode, 4, done.stderr)
+
+    def test_compares_refinement_with_full(self):
+        for refine in ("full", "paper1", "paper2", "expansion", "adaptive"):
+            for command in (["render", self.model], ["reveal", self.model, "--target", "inner"]):
+                with self.subTest(refine=refine, command=command[0]):
+                    args = [*command, "--refine", refine, "--macro", "4", "--size", "160x120", "--json"]
+                    self.assertIsNone(json.loads(self.expect(run(*args), 0).stdout)["refinement"])
+                    done = self.expect(run(*args, "--compare-full"), 0, refine + " against full")
+                    report = json.loads(done.stdout)
+                    self.assertEqual(report["options"]["refine"], refine)
+                    self.assertEqual(report["options"]["macro_px"], 4)
+                    self.assertEqual(report["options"]["compare_full"], True)
+                    found = report["refinement"]
+                    self.assertLessEqual(found["traced_share"], 1)
+                    self.assertLess(found["wrong_ids_share"], 0.05)
+                    self.assertEqual(found["missed_parts"], [])
+                    self.assertGreater(found["full_rays"]["all"], 160 * 120)
+                    self.assertGreaterEqual(report["run"]["refinement_seconds"]["full"]["cpu"], 0)
+                    if refine == "full":
+                        self.assertIsNone(found["psnr_db"])
+                        self.assertEqual(found["rays"], found["full_rays"])
+                    elif found["psnr_db"] is not None:
+                        self.assertGreater(found["psnr_db"], 20)
 
     def test_no_clobber(self):
         self.write("o.png", b"old")

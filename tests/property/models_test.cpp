@@ -203,6 +203,50 @@ TEST_P(Models, ClearanceAgreesWithOpenCv) {
     }
 }
 
+TEST_P(Models, ThePapersRefinementComesCloseAndMeasuresTracedIdsAlone) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    const Scene scene = load_scene((shared / "models" / GetParam().file).string());
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    RevealParams params;
+    params.targets = select_parts(scene, GetParam().targets);
+    params.camera.name = "iso";
+    params.width = 480, params.height = 270;
+    params.plan.tight = Tight::open;
+    const auto refined = [&](Refine refine) {
+        params.render.refine = refine;
+        params.compare_full = refine != Refine::full;
+        return reveal(meshes, params);
+    };
+    const Revealed full = refined(Refine::full);
+    for (const Refine refine : {Refine::paper1, Refine::paper2, Refine::expansion}) {
+        const Revealed found = refined(refine);
+        const Refinement& figures = found.report.refinement->figures;
+        EXPECT_GT(figures.psnr_db(), 20);
+        EXPECT_LT(figures.wrong_ids, figures.pixels / 50);
+        EXPECT_LT(figures.traced, figures.pixels);
+        EXPECT_LE(figures.rays.primary, figures.full_rays.primary);
+        // Whatever was inferred, the report says what full tracing finds.
+        for (std::size_t i = 0; i < full.frame.ids.id.pixels().size(); ++i) {
+            const float depth = full.frame.ids.depth.pixels()[i];
+            if (found.frame.ids.id.pixels()[i] != full.frame.ids.id.pixels()[i]) // two surfaces at one depth
+                ASSERT_NEAR(found.frame.ids.depth.pixels()[i], depth, 1e-5f * depth);
+            else
+                ASSERT_TRUE(found.frame.ids.depth.pixels()[i] == depth ||
+                            std::abs(found.frame.ids.depth.pixels()[i] - depth) < 1e-5f * depth);
+        }
+        EXPECT_TRUE(found.frame.inferred.empty());
+        for (std::size_t i = 0; i < full.report.targets.size(); ++i) {
+            EXPECT_EQ(found.report.targets[i].visible_before, full.report.targets[i].visible_before);
+            EXPECT_EQ(found.report.targets[i].visible_after, full.report.targets[i].visible_after);
+            EXPECT_EQ(found.report.targets[i].ring_mean, full.report.targets[i].ring_mean);
+        }
+        EXPECT_EQ(found.report.picture.outline_iou, full.report.picture.outline_iou);
+        EXPECT_EQ(found.report.picture.context_removed, full.report.picture.context_removed);
+        EXPECT_EQ(found.report.picture.wall_visible, full.report.picture.wall_visible);
+        EXPECT_EQ(found.report.picture.parts_lost, full.report.picture.parts_lost);
+    }
+}
+
 TEST_P(Models, SamePictureForAnyThreadsOrderOfPartsAndDuplicates) {
     PORTHOLE_NEEDS_SHARED(shared);
     const std::string file = (shared / "models" / GetParam().file).string();

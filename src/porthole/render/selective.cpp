@@ -76,7 +76,9 @@ private:
             unseen.clear();
         };
         for (const Vec2i p : pixels) {
-            if (picture_.known(p.x, p.y)) continue;
+            // Of surfaces at one depth it is the packet that decides which is hit: around a hole packets
+            // have to be those of the plain picture, whatever is known already.
+            if (stage_.cut && picture_.known(p.x, p.y)) continue;
             unseen.push_back(p);
             if (unseen.size() == kLanes) look_at_unseen();
         }
