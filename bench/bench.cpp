@@ -2,7 +2,8 @@
 //
 //   porthole_bench --benchmark_format=json
 //
-// Procedural scenes always run; models from $PORTHOLE_SHARED/models when it is set.
+// Procedural scenes always run; models from $PORTHOLE_SHARED/models when it is set; a scene of
+// 10^9 instanced triangles when $PORTHOLE_INSTANCES is.
 #include <benchmark/benchmark.h>
 
 #include <cstdlib>
@@ -14,6 +15,7 @@
 #include "bare_embree.h"
 #include "contours.h"
 #include "cut_frame.h"
+#include "instances.h"
 #include "porthole/io/load.h"
 #include "porthole/plan.h"
 #include "porthole/render/render.h"
@@ -182,6 +184,8 @@ int main(int argc, char** argv) {
     }
     if (const char* assembly = std::getenv("PORTHOLE_ASSEMBLY")) add_benchmarks({"assembly", assembly, {"part_00"}});
     porthole::bench::add_contour_benchmarks();
+    // Frames of seconds: only when asked for.
+    if (std::getenv("PORTHOLE_INSTANCES")) porthole::bench::add_instances();
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();

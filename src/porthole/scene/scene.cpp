@@ -1,7 +1,9 @@
 #include "porthole/scene/scene.h"
 
 #include <algorithm>
+#include <span>
 #include <unordered_map>
+#include <utility>
 
 namespace porthole {
 
@@ -21,9 +23,82 @@ Bounds3d part_bounds(const Scene& scene, PartId id) {
     return bounds;
 }
 
+namespace {
+
+constexpr std::size_t kRun = 256; ///< vertices
+
+std::vector<Bounds3f> boxes_of_runs(const Mesh& mesh) {
+    std::vector<Bounds3f> boxes((mesh.positions.size() + kRun - 1) / kRun);
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) boxes[i / kRun].extend(mesh.positions[i]);
+    return boxes;
+}
+
+/// The box of a placed box, enlarged by more than what rounding can do to the points in it.
+Bounds3d placed_box(const Affine3d& m, const Bounds3f& box) {
+    const Vec3d center = Vec3d(box.lower) * 0.5 + Vec3d(box.upper) * 0.5;
+    const Vec3d half = Vec3d(box.upper) * 0.5 - Vec3d(box.lower) * 0.5;
+    const Vec3d c = m.point(center);
+    Bounds3d out;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double x = std::abs(m.x[axis]), y = std::abs(m.y[axis]), z = std::abs(m.z[axis]);
+        const double extent = x * half.x + y * half.y + z * half.z;
+        const double size =
+            x * std::abs(center.x) + y * std::abs(center.y) + z * std::abs(center.z) + extent + std::abs(m.p[axis]);
+        out.lower[axis] = c[axis] - extent - 1e-12 * size;
+        out.upper[axis] = c[axis] + extent + 1e-12 * size;
+    }
+    return out;
+}
+
+bool lies_in(const Bounds3d& inner, const Bounds3d& outer) {
+    return inner.lower.x >= outer.lower.x && inner.lower.y >= outer.lower.y && inner.lower.z >= outer.lower.z &&
+           inner.upper.x <= outer.upper.x && inner.upper.y <= outer.upper.y && inner.upper.z <= outer.upper.z;
+}
+
+/// Adds a part of which `runs` are the vertices' boxes. Looks at no vertex that cannot matter.
+void extend_by_part(Bounds3d& bounds, const Mesh& mesh, std::span<const Bounds3f> runs, const Affine3d& m) {
+    for (std::size_t run = 0; run < runs.size(); ++run) {
+        if (lies_in(placed_box(m, runs[run]), bounds)) continue;
+        const std::size_t end = std::min(mesh.positions.size(), (run + 1) * kRun);
+        for (std::size_t i = run * kRun; i < end; ++i) bounds.extend(m.point(Vec3d(mesh.positions[i])));
+    }
+}
+
+} // namespace
+
 Bounds3d scene_bounds(const Scene& scene) {
+    constexpr std::uint32_t kOften = 4; // placements from which the boxes of runs pay
+    std::vector<std::uint32_t> placements(scene.meshes.size(), 0);
+    for (const Part& part : scene.parts) ++placements[part.mesh];
+
     Bounds3d bounds;
-    for (const PartId id : all_parts(scene)) bounds.extend(part_bounds(scene, id));
+    std::vector<std::vector<Bounds3f>> runs(scene.meshes.size());
+    std::vector<std::pair<const Part*, Bounds3d>> often; // parts and boxes around them
+    for (const PartId id : all_parts(scene)) {
+        const Part& part = scene.parts[index(id)];
+        const Mesh& mesh = scene.meshes[part.mesh];
+        if (placements[part.mesh] < kOften || mesh.positions.size() <= kRun || !mesh.primitives.empty()) {
+            bounds.extend(part_bounds(scene, id));
+            continue;
+        }
+        if (runs[part.mesh].empty()) runs[part.mesh] = boxes_of_runs(mesh);
+        Bounds3f box;
+        for (const Bounds3f& run : runs[part.mesh]) box.extend(run);
+        often.emplace_back(&part, placed_box(part.world_from_mesh, box));
+    }
+    if (often.empty()) return bounds;
+
+    // The outermost first: then most others are seen to lie within.
+    const auto add = [&](const std::pair<const Part*, Bounds3d>& placed) {
+        const Part& part = *placed.first;
+        if (!lies_in(placed.second, bounds))
+            extend_by_part(bounds, scene.meshes[part.mesh], runs[part.mesh], part.world_from_mesh);
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+        add(*std::ranges::min_element(often, {}, [axis](const auto& p) { return p.second.lower[axis]; }));
+        add(*std::ranges::max_element(often, {}, [axis](const auto& p) { return p.second.upper[axis]; }));
+    }
+    for (const auto& placed : often) add(placed);
     return bounds;
 }
 
