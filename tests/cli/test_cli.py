@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import signal
+import struct
 import subprocess
 import time
 import unittest
@@ -105,6 +106,31 @@ class Input(Case):
         self.expect(run("render", self.write("cut.glb", glb), "-o", self.path("o.png")), 3, "cut.glb")
         self.assertEqual(self.read("o.png"), b"old")
         self.assertEqual(self.files(), ["box.obj", "cut.glb", "o.png"])
+
+    def test_large_file_cut_short_while_it_is_read(self):
+        # Large enough to be mapped; of zeros, so that it takes no room on the disk.
+        vertices = 9_000_000
+        size = 12 * vertices
+        text = json.dumps({
+            "asset": {"version": "2.0"}, "buffers": [{"byteLength": size}],
+            "bufferViews": [{"buffer": 0, "byteLength": size}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": vertices, "type": "VEC3"}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0}).encode()
+        text += b" " * (-len(text) % 4)
+        header = b"glTF" + struct.pack("<II", 2, 28 + len(text) + size)
+        header += struct.pack("<I", len(text)) + b"JSON" + text + struct.pack("<I", size) + b"BIN\0"
+        for delay in (0.01, 0.03, 0.06):
+            path = self.write("large.glb", header)
+            os.truncate(path, len(header) + size)
+            process = subprocess.Popen([harness.PROGRAM, "parts", path], stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.PIPE)
+            time.sleep(delay)
+            os.truncate(path, 4096)
+            said = process.communicate(timeout=60)[1].decode()
+            if process.returncode != 0:  # it was not read to its end before
+                self.assertEqual(process.returncode, 3, said)
+                self.assertIn("error[E0", said)
 
     def test_standard_input(self):
         model = nested_boxes().encode()
