@@ -325,7 +325,7 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     if (!touched.empty()) {
         // The band is all that the hole adds to what the targets' pixels span, whatever their shape.
         windows.enclosing = touched.grown(margins.hole).intersected(windows.whole);
-        plan.window = touched.grown(plan.depth_px + kBeyondBand).intersected(windows.whole);
+        plan.window = touched.grown(std::min(plan.depth_px + kBeyondBand, margins.hole)).intersected(windows.whole);
     }
     if (plan.opened.empty()) return plan;
     windows.targets = {std::min(touched.x0, plan.window.x0), std::min(touched.y0, plan.window.y0),

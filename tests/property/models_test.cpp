@@ -183,7 +183,7 @@ TEST_P(Models, ClearanceAgreesWithOpenCv) {
     const ViewPlan plan = plan_view(subject, view, {.tight = Tight::open});
     ASSERT_FALSE(plan.hole.empty());
 
-    const Rect w = plan.window;
+    const Rect w = plan.enclosing.window();
     cv::Mat inside(w.height(), w.width(), CV_8U), distance;
     bool any_outside = false;
     for (int y = 0; y < w.height(); ++y)
