@@ -21,6 +21,7 @@
 #include "porthole/render/render.h"
 #include "porthole/scene/camera.h"
 #include "porthole/scene/select.h"
+#include "refine.h"
 #include "support/shapes.h"
 
 namespace porthole::bench {
@@ -186,6 +187,7 @@ int main(int argc, char** argv) {
     porthole::bench::add_contour_benchmarks();
     // Frames of seconds: only when asked for.
     if (std::getenv("PORTHOLE_INSTANCES")) porthole::bench::add_instances();
+    porthole::bench::add_refine_benchmarks();
     benchmark::Initialize(&argc, argv);
     if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
     benchmark::RunSpecifiedBenchmarks();

@@ -11,7 +11,7 @@ namespace {
 // What may be inferred. Colours are encoded as files have them, so errors are as the eye sees them.
 constexpr float kColorError = 0.012f;   ///< estimated, half way between two traced blocks
 constexpr float kDepthError = 1.0f;     ///< the same, pixels
-constexpr float kAmbientStep = 0.12f;   ///< of the open share, from block to block
+constexpr float kAmbientStep = 0.25f;   ///< of the open share, from block to block
 constexpr float kLampStep = 0.02f;      ///< of the lamps' share
 constexpr float kSmooth = 0.9f;         ///< cosine between normals of one surface
 constexpr float kOneSurface = 0.8f;     ///< the same, farther apart
