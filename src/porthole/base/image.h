@@ -4,6 +4,10 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <type_traits>
 #include <vector>
 
 #include "porthole/base/math.h"
@@ -70,6 +74,39 @@ public:
 private:
     Rect window_;
     std::vector<T> pixels_;
+};
+
+/// Pixels that start as zeros and of which most may never be touched: memory is taken a page at a
+/// time as they are. T is of those whose bytes may all be zero.
+template <typename T> class SparseImage {
+public:
+    explicit SparseImage(Rect window) : window_(window) {
+        if (window.empty()) return;
+        pixels_.reset(static_cast<T*>(
+            std::calloc(std::size_t(window.width()) * std::size_t(window.height()), sizeof(T))));
+        if (!pixels_) throw std::bad_alloc();
+    }
+    [[nodiscard]] Rect window() const { return window_; }
+    [[nodiscard]] bool contains(std::int32_t x, std::int32_t y) const { return window_.contains(x, y); }
+    T& operator()(std::int32_t x, std::int32_t y) { return pixels_.get()[index(x, y)]; }
+    const T& operator()(std::int32_t x, std::int32_t y) const { return pixels_.get()[index(x, y)]; }
+    /// All of them will be touched.
+    void expect_all() {
+        if (!window_.empty())
+            expect_use(pixels_.get(), std::size_t(window_.width()) * std::size_t(window_.height()) * sizeof(T));
+    }
+
+private:
+    static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+    struct Free {
+        void operator()(T* p) const { std::free(p); }
+    };
+    [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y) const {
+        assert(contains(x, y));
+        return std::size_t(y - window_.y0) * std::size_t(window_.width()) + std::size_t(x - window_.x0);
+    }
+    Rect window_;
+    std::unique_ptr<T[], Free> pixels_;
 };
 
 struct Rgba8 {

@@ -186,21 +186,30 @@ void Refinement::trace_level(int level) {
 }
 
 void Refinement::decide_cells(int level) {
-    Mask& cells = map_.cells[level];
-    parallel_for(std::size_t(cells.height()), control_, [&](std::size_t row) {
-        const int cy = int(row);
-        const auto [top, bottom] = map_.rows.cell(level, cy);
+    const LatticeAxis &columns = map_.columns, &rows = map_.rows;
+    Mask &across = map_.across[level], &down = map_.down[level], &cells = map_.cells[level];
+    parallel_for(std::size_t(rows.blocks(level)), control_, [&](std::size_t k) {
+        const int row = int(k), by = rows.block(level, row);
+        for (int cx = 0; cx < across.width(); ++cx) {
+            const auto [left, right] = columns.cell(level, cx);
+            across(cx, row) = agreement({left, by}, {right, by});
+        }
+        if (row >= rows.cells(level)) return;
+        const auto [top, bottom] = rows.cell(level, row);
+        for (int column = 0; column < down.width(); ++column) {
+            const int bx = columns.block(level, column);
+            down(column, row) = agreement({bx, top}, {bx, bottom});
+        }
+    });
+    parallel_for(std::size_t(cells.height()), control_, [&](std::size_t k) {
+        const int cy = int(k), below = std::min(cy + 1, across.height() - 1);
         for (int cx = 0; cx < cells.width(); ++cx) {
-            if (level > 0) {
-                const std::uint8_t parent = map_.cells[0](map_.columns.parent(cx), map_.rows.parent(cy));
-                if (parent != BlockMap::differs) {
-                    cells(cx, cy) = parent;
-                    continue;
-                }
-            }
-            const auto [left, right] = map_.columns.cell(level, cx);
-            const Vec2i a{left, top}, b{right, top}, c{left, bottom}, d{right, bottom};
-            cells(cx, cy) = std::min({agreement(a, b), agreement(c, d), agreement(a, c), agreement(b, d)});
+            const int right = std::min(cx + 1, down.width() - 1);
+            const std::uint8_t parent =
+                level > 0 ? map_.cells[0](columns.parent(cx), rows.parent(cy)) : std::uint8_t(BlockMap::differs);
+            cells(cx, cy) = parent != BlockMap::differs
+                                ? parent
+                                : std::min({across(cx, cy), across(cx, below), down(cx, cy), down(right, cy)});
         }
     });
 }
@@ -286,10 +295,10 @@ std::vector<Vec2i> Refinement::seeds_of(PartId id) const {
             return;
         const int x = int(p.x), y = int(p.y), bx = x / kCell, by = y / kCell;
         if (map_.state(bx, by) != BlockMap::wanted) return;
-        const Between at = Surrounding(map_, bx, by).at(x, y);
+        const Surrounding around(map_, bx, by);
         const IdBuffer& ids = picture_.buffer.ids;
-        if (ids.id(at.left, at.top) == id) return;
-        if (at.mix_of([&](int cx, int cy) { return ids.depth(cx, cy); }) < kHidden * p.depth) return;
+        if (ids.id(around.left_of(x), around.top_of(y)) == id) return;
+        if (around.mix(x, y, [&](int cx, int cy) { return ids.depth(cx, cy); }) < kHidden * p.depth) return;
         found.push_back({bx, by});
     };
     const std::size_t n = mesh.positions.size();
@@ -366,11 +375,10 @@ bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
     const BlockSummary& here = map_.summary(traced.x, traced.y);
     const std::uint32_t key = map_.summary(around.block[0].x, around.block[0].y).key;
     if (here.uniform && here.key == key && key != GBuffer::kNoKey) {
-        const Between at = around.at(r.x0, r.y0);
-        const float ambient = around.mix_of(map_, at, [](const BlockSummary& s) { return s.ambient(); });
+        const float ambient = around.mix_blocks(map_, r.x0, r.y0, [](const BlockSummary& s) { return s.ambient(); });
         if (std::abs(here.ambient() - ambient) > 2 * kAmbientStep) return true;
         for (int c = 0; c < 3; ++c) {
-            const float lamp = around.mix_of(map_, at, [c](const BlockSummary& s) { return s.lamps[c]; });
+            const float lamp = around.mix_blocks(map_, r.x0, r.y0, [c](const BlockSummary& s) { return s.lamps[c]; });
             if (std::abs(here.lamps[c] - lamp) > 255.0f * 2 * kLampStep) return true;
         }
     }
@@ -382,8 +390,7 @@ bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
         if (buffer.key(p.x, p.y) != key) return true;
         if (key == GBuffer::kNoKey) continue;
         const Vec2i q{p.x + dx, p.y + dy};
-        const Between at = around.at(q.x, q.y);
-        const float depth = 1.0f / at.mix_of([&](int x, int y) { return 1.0f / buffer.ids.depth(x, y); });
+        const float depth = 1.0f / around.mix(q.x, q.y, [&](int x, int y) { return 1.0f / buffer.ids.depth(x, y); });
         const auto position = [&](Vec2i pixel, float z) {
             const Ray ray = picture_.view.ray(float(pixel.x) + 0.5f, float(pixel.y) + 0.5f);
             return ray.origin + ray.direction * (z / ray.depth_per_t);
@@ -391,7 +398,8 @@ bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
         const Vec3f step = position(q, depth) - position(p, buffer.ids.depth(p.x, p.y));
         const Vec3f normal = unpack_normal(buffer.pixels(p.x, p.y).normal);
         if (std::abs(dot(step, normal)) > kOffPlane * picture_.view.pixel_size(depth)) return true;
-        const Pixel& nearest = buffer.pixels(at.tx < 0.5f ? at.left : at.right, at.ty < 0.5f ? at.top : at.bottom);
+        const Pixel& nearest = buffer.pixels(around.tx(q.x) < 0.5f ? around.left_of(q.x) : around.right_of(q.x),
+                                             around.ty(q.y) < 0.5f ? around.top_of(q.y) : around.bottom_of(q.y));
         if (dot(normal, unpack_normal(nearest.normal)) < kOneSurface) return true;
     }
     return false;
@@ -422,18 +430,17 @@ bool Refinement::light_fits(int bx, int by) {
     const Surrounding around(map_, bx, by);
     for (int y = r.y0; y < r.y1; ++y)
         for (int x = r.x0; x < r.x1; ++x) {
-            const Between at = around.at(x, y);
-            const std::uint32_t key = buffer.key(at.left, at.top);
+            const int left = around.left_of(x), right = around.right_of(x);
+            const int top = around.top_of(y), bottom = around.bottom_of(y);
+            const std::uint32_t key = buffer.key(left, top);
             const Pixel& p = buffer.pixels(x, y);
             if (!p.has(Pixel::traced) || buffer.key(x, y) != key) return false;
             if (key == GBuffer::kNoKey) continue;
             const Vec3f normal = unpack_normal(p.normal);
             const auto off = [&](int cx, int cy) {
-                const Pixel& corner = buffer.pixels(cx, cy);
-                return dot(unpack_normal(corner.normal), normal) < kSmooth;
+                return dot(unpack_normal(buffer.pixels(cx, cy).normal), normal) < kSmooth;
             };
-            if (off(at.left, at.top) || off(at.right, at.top) || off(at.left, at.bottom) || off(at.right, at.bottom))
-                return false;
+            if (off(left, top) || off(right, top) || off(left, bottom) || off(right, bottom)) return false;
         }
     for (int y = r.y0; y < r.y1; ++y)
         for (int x = r.x0; x < r.x1; ++x) buffer.pixels(x, y).flags |= Pixel::inferred;
@@ -446,19 +453,15 @@ void Refinement::infer_surface(int bx, int by, bool light) {
     GBuffer& buffer = picture_.buffer;
     const Rect r = map_.pixels(bx, by);
     const Surrounding around(map_, bx, by);
-    const PartId id = buffer.ids.id(around.at(r.x0, r.y0).left, around.at(r.x0, r.y0).top);
+    const PartId id = buffer.ids.id(around.left_of(r.x0), around.top_of(r.y0));
+    if (id == kNoPart) return; // as the buffer is
     const bool surface = map_.allows(bx, by) == BlockMap::one_color;
     const bool parallel = picture_.view.orthographic;
     for (int y = r.y0; y < r.y1; ++y)
         for (int x = r.x0; x < r.x1; ++x) {
             if (surface) {
-                buffer.pixels(x, y).flags = Pixel::inferred;
                 buffer.ids.id(x, y) = id;
-            }
-            if (id == kNoPart) continue;
-            const Between at = around.at(x, y);
-            if (surface) {
-                const float d = at.mix_of([&](int cx, int cy) {
+                const float d = around.mix(x, y, [&](int cx, int cy) {
                     return parallel ? buffer.ids.depth(cx, cy) : 1.0f / buffer.ids.depth(cx, cy);
                 });
                 buffer.ids.depth(x, y) = parallel ? d : 1.0f / d;
@@ -466,8 +469,10 @@ void Refinement::infer_surface(int bx, int by, bool light) {
             if (!light) continue;
             Pixel& p = buffer.pixels(x, y);
             const auto normal = [&](int cx, int cy) { return unpack_normal(buffer.pixels(cx, cy).normal); };
-            if (surface) p.normal = pack_normal(normalize(at.mix_of(normal), normal(at.left, at.top)));
-            const auto rounded = [&](auto&& value) { return std::lround(around.mix_of(map_, at, value)); };
+            if (surface)
+                p.normal =
+                    pack_normal(normalize(around.mix(x, y, normal), normal(around.left_of(x), around.top_of(y))));
+            const auto rounded = [&](auto&& value) { return std::lround(around.mix_blocks(map_, x, y, value)); };
             p.ambient_open = std::uint16_t(rounded([](const BlockSummary& s) { return s.open; }));
             p.ambient_all = std::uint16_t(rounded([](const BlockSummary& s) { return s.all; }));
             for (int c = 0; c < 3; ++c)
@@ -528,21 +533,28 @@ BlockMap::BlockMap(const Picture& picture)
       rows(window.y0 / kCell, (window.y1 - 1) / kCell),
       state(Rect{window.x0 / kCell, window.y0 / kCell, (window.x1 - 1) / kCell + 1, (window.y1 - 1) / kCell + 1}),
       allows(state.window(), differs), level(state.window()), summary(state.window()) {
-    for (int lattice = 0; lattice < LatticeAxis::kLevels; ++lattice)
+    for (int lattice = 0; lattice < LatticeAxis::kLevels; ++lattice) {
         cells[lattice] = Mask(columns.cells(lattice), rows.cells(lattice), differs);
+        across[lattice] = Mask(columns.cells(lattice), rows.blocks(lattice), differs);
+        down[lattice] = Mask(columns.blocks(lattice), rows.cells(lattice), differs);
+    }
     const Rect a = area();
-    for (int by = a.y0; by < a.y1; ++by)
+    if (picture.everything) std::fill(state.pixels().begin(), state.pixels().end(), wanted);
+    for (int by = a.y0; by < a.y1 && !picture.everything; ++by)
         for (int bx = a.x0; bx < a.x1; ++bx) {
             const Rect r = pixels(bx, by);
             for (int y = r.y0; y < r.y1; ++y)
                 for (int x = r.x0; x < r.x1; ++x)
-                    if (picture.buffer.pixels(x, y).has(Pixel::traced) || picture.covered.at_or(x, y, 0))
-                        state(bx, by) = wanted;
+                    if (picture.buffer.pixels(x, y).has(Pixel::traced)) state(bx, by) = wanted;
         }
 }
 
 BlockMap::Cell BlockMap::allowed(int lattice, int bx, int by) const {
     const LatticeAxis::Place x = columns.place(lattice, bx), y = rows.place(lattice, by);
+    if (lattice == LatticeAxis::kLevels - 1 && (x.low == bx) != (y.low == by)) {
+        const int column = columns.index(lattice, bx), row = rows.index(lattice, by);
+        return Cell(y.low == by ? across[lattice](column, row) : down[lattice](column, row));
+    }
     std::uint8_t least = one_color;
     for (int cy = y.cell_low; cy <= y.cell_high; ++cy)
         for (int cx = x.cell_low; cx <= x.cell_high; ++cx) least = std::min(least, cells[lattice](cx, cy));
@@ -580,10 +592,11 @@ void infer_colors(Picture& picture, const BlockMap& map, Rect tile) {
             if (!map.is_inferred(bx, by)) continue;
             const Rect r = map.pixels(bx, by);
             const Surrounding around(map, bx, by);
+            for (int y = r.y0; y < r.y1; ++y) std::fill_n(&picture.inferred(r.x0, y), r.width(), std::uint8_t{1});
             if (map.summary(around.block[0].x, around.block[0].y).key == GBuffer::kNoKey) continue; // as it is
             for (int y = r.y0; y < r.y1; ++y)
                 for (int x = r.x0; x < r.x1; ++x)
-                    picture.color(x, y) = around.at(x, y).mix_of([&](int cx, int cy) { return picture.color(cx, cy); });
+                    picture.color(x, y) = around.mix(x, y, [&](int cx, int cy) { return picture.color(cx, cy); });
         }
 }
 

@@ -23,6 +23,7 @@ struct BlockSummary {
     bool uniform = false;      ///< one key and material, and no crease
     bool evenly_lit = false;   ///< by the lamps
     bool interpolable = false; ///< colours of its material follow from geometry and light alone
+    bool cornered = false;     ///< its corners have colours from which the rest follows, if it settles
     [[nodiscard]] float ambient() const { return all > 0 ? open / all : 1.0f; }
 };
 
@@ -43,10 +44,12 @@ struct BlockMap {
     Rect window; ///< of the picture, pixels
     LatticeAxis columns, rows;
     Mask state;
-    Mask allows;                 ///< Cell of blocks that are not traced,
-    Mask level;                  ///< and the lattice they follow from
-    Image<BlockSummary> summary; ///< of traced blocks
-    Mask cells[LatticeAxis::kLevels];
+    Mask allows;                       ///< Cell of blocks that are not traced,
+    Mask level;                        ///< and the lattice they follow from
+    Image<BlockSummary> summary;       ///< of traced blocks
+    Mask cells[LatticeAxis::kLevels];  ///< Cell of each
+    Mask across[LatticeAxis::kLevels]; ///< Cell of two lattice blocks side by side: by cell and lattice row
+    Mask down[LatticeAxis::kLevels];   ///< one above the other: by lattice column and cell
 
     explicit BlockMap(const Picture& picture);
     [[nodiscard]] Rect area() const { return state.window(); }
@@ -57,47 +60,43 @@ struct BlockMap {
     [[nodiscard]] bool is_inferred(int bx, int by) const {
         return state(bx, by) == wanted && allows(bx, by) == one_color;
     }
-    /// Least of what the level's cells around a block allow.
+    /// What a lattice allows for a block: the least of the cells around it, but on the line
+    /// between two blocks of the finest lattice what these two allow.
     [[nodiscard]] Cell allowed(int lattice, int bx, int by) const;
     /// Whether some block in or beside `tile` may see edges.
     [[nodiscard]] bool is_busy(Rect tile) const;
 };
 
-/// From which traced pixels a pixel of a block takes what it shows: the weights tx and ty are of
-/// the right and lower ones.
-struct Between {
-    int left, right, top, bottom;
-    float tx, ty;
-    template <typename T> [[nodiscard]] T mix(T a, T b, T c, T d) const {
-        const T upper = a + (b - a) * tx, lower = c + (d - c) * tx;
-        return upper + (lower - upper) * ty;
-    }
-    /// Of what value(x, y) gives at the four pixels.
-    template <typename Value> [[nodiscard]] auto mix_of(Value&& value) const {
-        return mix(value(left, top), value(right, top), value(left, bottom), value(right, bottom));
-    }
-};
-
-/// Between which blocks of the lattice a block lies.
+/// What the pixels of a block follow from: four traced pixels each, those nearest of the blocks
+/// around it. On a lattice row or column these are the row's or column's own.
 struct Surrounding {
     Vec2i block[4]; ///< upper left, upper right, lower left, lower right
     bool between_columns, between_rows;
-    int left, right, top, bottom; ///< pixels nearest to it of the blocks around it
+    int left, right, top, bottom; ///< pixels
     float x_step, y_step;
 
     Surrounding(const BlockMap& map, int bx, int by);
-    [[nodiscard]] Between at(int x, int y) const {
-        return {between_columns ? left : x,
-                between_columns ? right : x,
-                between_rows ? top : y,
-                between_rows ? bottom : y,
-                between_columns ? float(x - left) * x_step : 0.0f,
-                between_rows ? float(y - top) * y_step : 0.0f};
+    [[nodiscard]] int left_of(int x) const { return between_columns ? left : x; }
+    [[nodiscard]] int right_of(int x) const { return between_columns ? right : x; }
+    [[nodiscard]] int top_of(int y) const { return between_rows ? top : y; }
+    [[nodiscard]] int bottom_of(int y) const { return between_rows ? bottom : y; }
+    [[nodiscard]] float tx(int x) const { return between_columns ? float(x - left) * x_step : 0.0f; }
+    [[nodiscard]] float ty(int y) const { return between_rows ? float(y - top) * y_step : 0.0f; }
+
+    /// Of what value(x, y) gives at the four pixels.
+    template <typename Value> [[nodiscard]] auto mix(int x, int y, Value&& value) const {
+        const auto column = [&](int at) {
+            const auto a = value(at, top_of(y));
+            return a + (value(at, bottom_of(y)) - a) * ty(y);
+        };
+        const auto a = column(left_of(x));
+        return a + (column(right_of(x)) - a) * tx(x);
     }
     /// Of what value(summary) gives of the four blocks.
-    template <typename Value> [[nodiscard]] float mix_of(const BlockMap& map, const Between& at, Value&& value) const {
+    template <typename Value> [[nodiscard]] float mix_blocks(const BlockMap& map, int x, int y, Value&& value) const {
         const auto of = [&](int i) { return float(value(map.summary(block[i].x, block[i].y))); };
-        return at.mix(of(0), of(1), of(2), of(3));
+        const float a = of(0) + (of(2) - of(0)) * ty(y), b = of(1) + (of(3) - of(1)) * ty(y);
+        return a + (b - a) * tx(x);
     }
 };
 

@@ -78,7 +78,12 @@ TEST(Filter, DoesNotCrossPartsRimsCreasesOrSteps) {
 
 TEST(Filter, KeepsColouredShadows) {
     Wall wall;
-    for (Pixel& pixel : wall.buffer.pixels.pixels()) pixel.lamps[0] = 255, pixel.lamps[1] = 51, pixel.lamps[2] = 0;
+    const Rect w = wall.buffer.window();
+    for (int y = w.y0; y < w.y1; ++y)
+        for (int x = w.x0; x < w.x1; ++x) {
+            Pixel& pixel = wall.buffer.pixels(x, y);
+            pixel.lamps[0] = 255, pixel.lamps[1] = 51, pixel.lamps[2] = 0;
+        }
     const Vec3f lamps = wall.filtered()->reach(20, 20).lamps;
     EXPECT_NEAR(lamps.x, 1.0f, 1e-5f);
     EXPECT_NEAR(lamps.y, 0.2f, 1e-5f);

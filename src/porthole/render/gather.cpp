@@ -31,8 +31,10 @@ void gather_block(Picture& picture, const Occlusion& occlusion, const std::vecto
         const int x = bx + i % kCell, y = by + i / kCell;
         samples.x[i] = float(x) + 0.5f, samples.y[i] = float(y) + 0.5f;
         if (!buffer.pixels.contains(x, y)) continue;
-        const Pixel& pixel = buffer.pixels(x, y);
-        samples.active[i] = pixel.has(Pixel::traced) || is_covered(picture, x, y);
+        Pixel& pixel = buffer.pixels(x, y);
+        const bool covered = is_covered(picture, x, y);
+        if (picture.everything && !covered) pixel.flags |= Pixel::traced;
+        samples.active[i] = pixel.has(Pixel::traced) || covered;
         samples.may_open[i] = pixel.has(Pixel::may_open);
         any |= samples.active[i];
     }
@@ -121,7 +123,7 @@ std::optional<SurfacePoint> record(Picture& picture, const std::vector<Placement
 }
 
 void mark_everything(Picture& picture, const Cut* cut) {
-    for (Pixel& pixel : picture.buffer.pixels.pixels()) pixel.flags = Pixel::traced;
+    picture.everything = true;
     if (!cut || cut->empty()) return;
     // Samples of a pixel one inside the rim may see the plain scene; beside it the filter and
     // the edges look kLightMargin further.
@@ -144,7 +146,6 @@ void mark_everything(Picture& picture, const Cut* cut) {
             length = run(x, y) ? length + 1 : 0;
             if (length <= 2 * kReach) continue;
             picture.covered(x, y - kReach) = 1;
-            picture.buffer.pixels(x, y - kReach).flags = 0;
         }
     }
 }
@@ -167,7 +168,7 @@ Rect hole_window(const Cut& cut, const View& view) {
 }
 
 void mark_hole(Picture& picture, const Cut& cut) {
-    Image<Pixel>& pixels = picture.buffer.pixels;
+    SparseImage<Pixel>& pixels = picture.buffer.pixels;
     const Rect w = pixels.window();
     for (int by = block_floor(w.y0); by < w.y1; by += kCell)
         for (int bx = block_floor(w.x0); bx < w.x1; bx += kCell) {

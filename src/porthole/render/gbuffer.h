@@ -51,7 +51,7 @@ struct Pixel {
     float u = 0, v = 0;
     std::uint32_t normal = 0;                        ///< smooth, packed
     std::uint16_t ambient_open = 0, ambient_all = 0; ///< of Occlusion::Ambient, 65535 / rays a unit
-    std::uint8_t lamps[3] = {255, 255, 255};         ///< share of the lamps' light, one ray a lamp
+    std::uint8_t lamps[3] = {0, 0, 0};               ///< share of the lamps' light, one ray a lamp
     std::uint8_t flags = 0;
 
     [[nodiscard]] bool has(Flag f) const { return (flags & f) != 0; }
@@ -65,8 +65,8 @@ struct Pixel {
 
 /// Light that reaches a pixel's first sample, after the filter. 65535 is all of it.
 struct PixelLight {
-    std::uint16_t lamps[3] = {65535, 65535, 65535};
-    std::uint16_t ambient = 65535;
+    std::uint16_t lamps[3] = {0, 0, 0};
+    std::uint16_t ambient = 0;
 
     PixelLight() = default;
     explicit PixelLight(const Reach& reach) {
@@ -81,9 +81,9 @@ struct PixelLight {
 };
 
 struct GBuffer {
-    Image<Pixel> pixels;
+    SparseImage<Pixel> pixels;
     IdBuffer ids;
-    Image<PixelLight> light;
+    SparseImage<PixelLight> light; ///< of pixels that are shaded
 
     explicit GBuffer(Rect window) : pixels(window), ids(window), light(window) {}
     [[nodiscard]] Rect window() const { return pixels.window(); }

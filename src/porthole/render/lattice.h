@@ -23,6 +23,10 @@ public:
     };
     [[nodiscard]] Place place(int level, int block) const;
     [[nodiscard]] bool on_lattice(int level, int block) const { return place(level, block).low == block; }
+    [[nodiscard]] int blocks(int level) const { return int(blocks_[level].size()); } ///< of the lattice
+    [[nodiscard]] int block(int level, int index) const { return blocks_[level][std::size_t(index)]; }
+    /// Which block of the lattice is the last not beyond `block`.
+    [[nodiscard]] int index(int level, int block) const { return below_[level][std::size_t(block - first_)]; }
     /// Cells lie between neighbouring lattice blocks; there is at least one.
     [[nodiscard]] int cells(int level) const;
     [[nodiscard]] std::pair<int, int> cell(int level, int index) const; ///< its first and last block

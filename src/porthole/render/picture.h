@@ -29,6 +29,7 @@ struct Picture {
     GBuffer buffer;
     Image<Vec4f> color; ///< display-linear, premultiplied; the buffer's window
     Mask edges;         ///< not 0 where the first sample is not enough: see find_edges()
+    bool everything = false; ///< every pixel is wanted, but for those covered
     Mask covered;       ///< 1 where only the ids are wanted; empty: nowhere
     Mask opened;        ///< with a cut: 1 where some sample is in the hole
     Mask known;         ///< of the paper's refinement: 1 where the first sample is traced, whether shaded or not
@@ -39,7 +40,7 @@ struct Picture {
         : view(seen), params(how), camera(by), buffer(window), color(window, Vec4f{}), edges(window), opened(window) {}
 };
 
-/// Marks what is to be traced in the plain picture: everything. Of pixels that `cut`, if there
+/// Says what is to be traced in the plain picture: everything. Of pixels that `cut`, if there
 /// is one, opens so far around that their light and edges are of no use to others, only the ids.
 void mark_everything(Picture& picture, const Cut* cut = nullptr);
 

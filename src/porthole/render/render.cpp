@@ -95,7 +95,7 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     const Stage stage{scene, bvh, cut, params, lighting, occlusion, placements, tints};
     const bool selective = is_selective(params.refine);
     std::optional<BlockMap> map;
-    if (params.refine == Refine::adaptive) {
+    if (params.refine == Refine::adaptive && !params.uniform) {
         // Where more than colours is looked at, what each pixel sees is traced.
         const bool everything = !cut && !targets && params.lines != Lines::all;
         map = gather_adaptive(picture, stage, everything, control);
@@ -103,6 +103,8 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     } else if (selective) {
         passes.run(0.3, [&](Rect tile) { look_tile(picture, placements, tile); });
     } else {
+        picture.buffer.pixels.expect_all();
+        picture.buffer.light.expect_all();
         passes.run(0.5, [&](Rect tile) { gather_tile(picture, occlusion, placements, tile); });
     }
     if (targets) tints = target_tints(scene, placements, picture.buffer, params.emphasis);
@@ -110,7 +112,10 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
         draw_selectively(picture, stage, control);
     } else {
         passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
-        if (map) passes.run(0, [&](Rect tile) { infer_colors(picture, *map, tile); });
+        if (map) {
+            picture.inferred = Mask(picture.buffer.window());
+            passes.run(0, [&](Rect tile) { infer_colors(picture, *map, tile); });
+        }
     }
     if (params.samples > 1 && !selective) {
         passes.run(0.02, [&](Rect tile) {
@@ -127,15 +132,6 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     passes.run(0.05, [&](Rect tile) { draw_lines(picture, stage, rim, tile); });
 }
 
-/// Which ids were not traced.
-void mark_inferred(const Picture& picture, Frame& frame) {
-    if (picture.params.refine != Refine::adaptive) return;
-    frame.inferred = Mask(frame.ids.window());
-    const std::vector<Pixel>& pixels = picture.buffer.pixels.pixels();
-    std::transform(pixels.begin(), pixels.end(), frame.inferred.pixels().begin(),
-                   [](const Pixel& p) { return std::uint8_t(p.flags == Pixel::inferred); });
-}
-
 Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut* covering,
                  const Control& control) {
     const Camera camera(bvh, targets, view, nullptr);
@@ -144,10 +140,8 @@ Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const Ren
     mark_everything(picture, is_selective(params.refine) ? nullptr : covering);
     if (is_selective(params.refine)) mark_known(picture, nullptr, covering, targets != nullptr);
     draw(picture, bvh, targets, nullptr, nullptr, control);
-    Frame frame{
+    return {
         std::move(picture.color), std::move(picture.buffer.ids), {}, std::move(picture.inferred), picture.rays.get()};
-    mark_inferred(picture, frame);
-    return frame;
 }
 
 Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const RenderParams& params, const Cut& cut,

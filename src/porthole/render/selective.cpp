@@ -185,8 +185,8 @@ void draw_selectively(Picture& picture, const Stage& stage, const Control& contr
     Mask wanted;
     if (stage.cut) {
         wanted = Mask(w, 0);
-        for (std::size_t i = 0; i < wanted.pixels().size(); ++i)
-            wanted.pixels()[i] = picture.buffer.pixels.pixels()[i].has(Pixel::in_hole);
+        for (int y = w.y0; y < w.y1; ++y)
+            for (int x = w.x0; x < w.x1; ++x) wanted(x, y) = picture.buffer.pixels(x, y).has(Pixel::in_hole);
     }
     PartialPicture partial(w);
     Tracing tracing(picture, stage, control);
