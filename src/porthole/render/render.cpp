@@ -136,8 +136,8 @@ Frame draw_plain(const Bvh& bvh, const Bvh* targets, const View& view, const Ren
                  const Control& control) {
     const Camera camera(bvh, targets, view, nullptr);
     Picture picture(view, params, camera, view.window());
-    // The paper's blocks reach under the hole: what is outside depends on what would be seen there.
-    mark_everything(picture, is_selective(params.refine) ? nullptr : covering);
+    // Blocks reach under the hole: what is inferred outside depends on what would be seen there.
+    mark_everything(picture, params.refine == Refine::full || params.uniform ? covering : nullptr);
     if (is_selective(params.refine)) mark_known(picture, nullptr, covering, targets != nullptr);
     draw(picture, bvh, targets, nullptr, nullptr, control);
     return {
