@@ -61,7 +61,7 @@ enum class Lines : std::uint8_t {
 struct RenderParams {
     int samples = 16;     ///< most samples per pixel, [1, 4096], spent where neighbours differ, and twice as many in
                           ///< the hole; 1: one at each centre
-    bool uniform = false; ///< all the samples in every pixel: the oracle of antialiasing, and dear
+    bool uniform = false; ///< all the samples in every pixel, whatever `refine` says: the oracle of antialiasing, dear
     int ao_samples = 4;   ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
     bool shadows = true;
     int max_bounces = 6; ///< reflections, refractions and blended surfaces along one path, [0, 64]
