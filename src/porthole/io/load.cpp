@@ -14,6 +14,7 @@
 #include "porthole/io/ply.h"
 #include "porthole/io/scene_json.h"
 #include "porthole/io/stl.h"
+#include "porthole/scene/texture.h"
 
 namespace porthole {
 namespace {
@@ -267,6 +268,7 @@ Scene load_scene(const std::string& path, const LoadParams& params, const Contro
     drop_empty_parts(scene);
     convert_units(scene, params);
     recentre(scene);
+    build_mips(scene, control);
     return scene;
 }
 

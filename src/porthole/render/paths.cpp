@@ -47,6 +47,12 @@ bool is_frosted(const Substance& s) {
     return s.roughness > kFrosted && (m.roughness < 1.0f || m.metallic_roughness_texture.texture >= 0);
 }
 
+/// How fast a cone of rays widens past a surface: `turn` times as much more as normals differ across it.
+/// Plain: as if it bent one way only, outward.
+float widened(const PathRay& ray, const Hit& hit, const Placement& placement, float turn) {
+    return hit.cap ? ray.widening : ray.widening + turn * ray.width * bending(placement, hit);
+}
+
 /// Facet normal `i` of `n` of a GGX surface.
 Vec3f facet_normal(Vec3f normal, float alpha, int i, int n) {
     const Vec2f d = disc_point(i, n); // evenly spread in area: radius squared is uniform
@@ -123,10 +129,13 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
         const PixelPoint p = stage.cut->view.project(point.position);
         return cap_substance(stage.scene, placement, hit, stage.params, {p.x, p.y}, stage.cut->view.height);
     };
-    Substance s = hit.cap ? cap() : substance(stage.scene, placement, hit, tint);
+    Footprint seen;
+    if (!hit.cap && !stage.scene.textures.empty())
+        seen = footprint(placement, hit, point.flat_normal, ray.direction, ray.width);
+    Substance s = hit.cap ? cap() : substance(stage.scene, placement, hit, tint, seen);
     const Vec3f to_eye = -ray.direction;
     const Vec3f normal = !hit.cap && s.material->normal_texture.texture >= 0
-                             ? mapped_normal(stage.scene, placement, hit, point, *s.material, ray.direction)
+                             ? mapped_normal(stage.scene, placement, hit, point, *s.material, ray.direction, seen)
                              : point.normal;
     Radiance& sum = radiance_[ray.slot];
     if (stage.params.shading == Shading::flat) {
@@ -154,6 +163,7 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
         if (above < 0.01f) next.direction = normalize(next.direction + point.flat_normal * (0.01f - above));
         next.weight = weight * shaded.mirror;
         next.roughness = s.roughness;
+        next.widening = widened(ray, hit, placement, 2);
         next.through = false;
         if (largest(next.weight) < least_weight(next))
             end_in_surroundings(next);
@@ -167,16 +177,17 @@ void Shader::add(const PathRay& ray, const Hit& hit, const SurfacePoint& point, 
         next.weight = ray.weight * (1.0f - coverage);
         push(next);
     }
-    if (s.transmission > 0) pass_through(ray, s, point, normal, weight * s.transmission, body);
+    if (s.transmission > 0) pass_through(ray, hit, s, point, normal, weight * s.transmission, body);
 }
 
-void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfacePoint& point, Vec3f normal, Vec3f weight,
-                          bool body) {
+void Shader::pass_through(const PathRay& ray, const Hit& hit, const Substance& s, const SurfacePoint& point,
+                          Vec3f normal, Vec3f weight, bool body) {
     const Scene& scene = stage_->scene;
     const float cosine = dot(normal, -ray.direction);
     PathRay next = ray;
     ++next.bounce;
     next.origin = point.beyond;
+    if (body) next.widening = widened(ray, hit, stage_->placements[index(hit.part)], 1);
     // Only the first surface spreads the ray: one blur stands for both sides.
     const int spread = !ray.spread && ray.through && is_frosted(s) ? (averaged_ ? kSpreadAveraged : kSpread) : 1;
     next.spread |= spread > 1;
@@ -221,6 +232,7 @@ void Shader::pass_through(const PathRay& ray, const Substance& s, const SurfaceP
     next = ray;
     ++next.bounce;
     next.origin = point.start;
+    next.widening = widened(ray, hit, stage_->placements[index(hit.part)], 2);
     next.direction = reflect(ray.direction, normal);
     next.weight = direction ? weight * mirrored : weight;
     push(next);
@@ -279,6 +291,7 @@ void Shader::trace_oldest() {
             end_in_surroundings(ray);
             continue;
         }
+        ray.width += ray.widening * from.tfar[i];
         const std::int32_t medium = ray.media.innermost();
         if (medium != kNone)
             ray.weight = ray.weight * absorption(stage.scene.materials[std::size_t(medium)], from.tfar[i]);

@@ -44,6 +44,8 @@ struct PathRay {
     int bounce = 0;         ///< surfaces behind it
     int pattern = 0;        ///< which part of the patterns it takes where it spreads, >= 0
     float roughness = 0;    ///< of the mirror it comes from
+    float width = 0;        ///< of the cone around the ray at `origin`, metres; at add(), at the hit
+    float widening = 0;     ///< of that cone, metres a metre
     bool in_hole = false;
     bool spread = false; ///< one of many that frosted glass made of a camera ray
     bool through = true; ///< it only ever passed through things: it sees the background, not the sky
@@ -83,8 +85,8 @@ public:
     void clear() { radiance_.assign(radiance_.size(), Radiance{}); }
 
 private:
-    void pass_through(const PathRay& ray, const Substance& substance, const SurfacePoint& point, Vec3f normal,
-                      Vec3f weight, bool body);
+    void pass_through(const PathRay& ray, const Hit& hit, const Substance& substance, const SurfacePoint& point,
+                      Vec3f normal, Vec3f weight, bool body);
     void push(const PathRay& ray);
     void end_in_surroundings(const PathRay& ray);
     void trace_oldest();

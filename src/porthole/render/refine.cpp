@@ -36,12 +36,15 @@ std::optional<Reach> borrow_light(const GBuffer& buffer, const View& view, std::
     return std::nullopt;
 }
 
-PathRay camera_path(Vec3f direction, std::uint32_t slot, bool in_hole, int pattern) {
+PathRay camera_path(const View& view, Vec3f direction, float depth, std::uint32_t slot, bool in_hole, int pattern) {
     PathRay ray;
     ray.pattern = pattern;
     ray.direction = direction;
     ray.slot = slot;
     ray.in_hole = in_hole;
+    // The cone of a pixel, also for one of its samples: they are fewer where textures alone differ.
+    ray.width = view.pixel_size(depth);
+    ray.widening = view.orthographic ? 0.0f : view.pixel_scale();
     return ray;
 }
 
@@ -125,7 +128,8 @@ void trace_samples(Picture& picture, const Stage& stage, std::span<const Wanted>
                 reach = stage.occlusion.reach({p.position, p.start, p.flat_normal, p.normal, seen.in_hole[i], pattern},
                                               rays);
         }
-        shader.add(camera_path(seen.direction[i], slot, seen.in_hole[i], pattern), hit, p, reach, seen.on_target[i]);
+        shader.add(camera_path(picture.view, seen.direction[i], seen.depth[i], slot, seen.in_hole[i], pattern), hit, p,
+                   reach, seen.on_target[i]);
     }
 }
 
@@ -173,8 +177,9 @@ void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
                                                           buffer.ids.depth(x, y), direction);
         const Reach reach = flat ? Reach{} : pixel.has(Pixel::inferred) ? pixel.reach() : filtered.reach(x, y);
         buffer.light(x, y) = PixelLight(reach);
-        shader.add(camera_path(direction, slot, pixel.has(Pixel::in_hole), cell_rank(x, y)), hit, point, reach,
-                   pixel.has(Pixel::on_target));
+        shader.add(camera_path(picture.view, direction, buffer.ids.depth(x, y), slot, pixel.has(Pixel::in_hole),
+                               cell_rank(x, y)),
+                   hit, point, reach, pixel.has(Pixel::on_target));
     }
     shader.finish();
     for (std::uint32_t slot = 0; slot < todo.size(); ++slot) {

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "porthole/render/test_scene.h"
+#include "porthole/scene/texture.h"
 #include "porthole/trace/visibility.h"
 
 namespace porthole {
@@ -208,6 +209,57 @@ TEST(Render, SamplesAtEdgesAreAsGoodAsSamplesEverywhere) {
     // More samples are better.
     edges.samples = 8;
     EXPECT_GT(squared_error(b.draw(view, edges), best), 2 * squared_error(some, best));
+}
+
+TEST(Render, TexturesSeenSmallAreFiltered) {
+    // A chequered floor to the horizon, and its image in a wall.
+    Scene s;
+    s.materials = {matte({1, 1, 1}), matte({1, 1, 1})};
+    s.materials[0].unlit = true;
+    s.materials[0].base_color_texture.texture = 0;
+    s.materials[1].metallic = 1, s.materials[1].roughness = 0;
+    Image<Rgba8> image(256, 256);
+    for (int y = 0; y < 256; ++y)
+        for (int x = 0; x < 256; ++x)
+            image(x, y) = (x / 8 + y / 8) % 2 ? Rgba8{240, 240, 240, 255} : Rgba8{20, 20, 60, 255};
+    s.images = {image};
+    Texture texture;
+    texture.image = 0;
+    s.textures = {texture};
+    add_part(s, quad_mesh({-20, 0, 20}, {40, 0, 0}, {0, 0, -40}, 0), "floor");
+    add_part(s, quad_mesh({0.2f, 0, -20}, {0, 0, 40}, {0, 3, 0}, 1), "wall");
+    const View view = look_at({-1, 1, 21}, {-0.5f, 0.2f, 0}, 128, 96, 0.4f);
+    RenderParams one, many;
+    one.samples = 1;
+    many.samples = 128, many.uniform = true;
+    const Built plain(s);
+    build_mips(s);
+    const Built filtered(std::move(s));
+    const Frame truth = plain.draw(view, many);
+    EXPECT_LT(squared_error(filtered.draw(view, one), truth), squared_error(plain.draw(view, one), truth) / 4);
+    // It then needs few samples of its own, and the horizon does not swim.
+    EXPECT_LT(filtered.draw(view).rays.primary, plain.draw(view).rays.primary);
+}
+
+TEST(Render, FilteringDoesNotChangeWhoIsHit) {
+    Scene s;
+    s.materials = {matte({0.2f, 0.3f, 0.8f}), matte({0.8f, 0.1f, 0.1f})};
+    s.materials[0].alpha_mode = AlphaMode::mask;
+    s.materials[0].base_color_texture.texture = 0;
+    Image<Rgba8> image(256, 256);
+    for (int y = 0; y < 256; ++y)
+        for (int x = 0; x < 256; ++x) image(x, y) = {200, 200, 200, std::uint8_t((x / 3 + y / 3) % 2 ? 255 : 0)};
+    s.images = {image};
+    Texture texture;
+    texture.image = 0;
+    s.textures = {texture};
+    add_part(s, quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0), "leaf");
+    add_part(s, quad_mesh({-2, -2, -1}, {4, 0, 0}, {0, 4, 0}, 1), "wall");
+    const View view = look_at({0, 0, 4}, {0, 0, 0}, 96, 64, 0.3f);
+    const Built plain(s);
+    build_mips(s);
+    const Built filtered(std::move(s));
+    EXPECT_EQ(filtered.draw(view).ids, plain.draw(view).ids);
 }
 
 TEST(Render, AMirrorShowsWhatStandsBeforeIt) {

@@ -129,13 +129,48 @@ SurfacePoint surface_point(const Placement& placement, const Hit& hit, Vec3f dir
     return s;
 }
 
-Substance substance(const Scene& scene, const Placement& placement, const Hit& hit, Tint tint) {
+Footprint footprint(const Placement& placement, const Hit& hit, Vec3f n, Vec3f direction, float width) {
+    const Mesh& mesh = *placement.mesh;
+    if (!mesh.primitives.empty() || !(width > 0)) return {};
+    constexpr float kLeastCosine = 1.0f / 32;
+    const Vec3u t = mesh.triangles[hit.triangle];
+    const Affine3f& m = placement.world_from_mesh;
+    const Vec3f e1 = m.vector(mesh.positions[t.y] - mesh.positions[t.x]);
+    const Vec3f e2 = m.vector(mesh.positions[t.z] - mesh.positions[t.x]);
+    const Vec3f area = cross(e1, e2);
+    const float squared = dot(area, area);
+    if (!(squared > 0)) return {};
+    const float cosine = dot(n, direction);
+    const Vec3f leaning = direction - n * cosine;
+    const Vec3f a = normalize(leaning, Frame3(n).x);
+    const auto barycentric = [&](Vec3f d) {
+        return Vec2f{dot(cross(d, e2), area), dot(cross(e1, d), area)} * (1.0f / squared);
+    };
+    return {barycentric(a * (width / std::max(std::abs(cosine), kLeastCosine))), barycentric(cross(n, a) * width)};
+}
+
+float bending(const Placement& placement, const Hit& hit) {
+    const Mesh& mesh = *placement.mesh;
+    if (!mesh.primitives.empty() || mesh.normals.empty()) return 0;
+    const Vec3u t = mesh.triangles[hit.triangle];
+    const std::uint32_t corner[3] = {t.x, t.y, t.z};
+    float most = 0;
+    for (int i = 0; i < 3; ++i) {
+        const std::uint32_t a = corner[i], b = corner[(i + 1) % 3];
+        const float far = length(placement.world_from_mesh.vector(mesh.positions[b] - mesh.positions[a]));
+        if (far > 0) most = std::max(most, length(mesh.normals[b] - mesh.normals[a]) / far);
+    }
+    return most;
+}
+
+Substance substance(const Scene& scene, const Placement& placement, const Hit& hit, Tint tint,
+                    const Footprint& footprint) {
     const Mesh& mesh = *placement.mesh;
     const Material& m = scene.materials[mesh.material_of(hit.triangle)];
     const auto look_up = [&](const TextureRef& ref, Encoding encoding) {
-        return sample_texture(scene, ref, mesh, hit.triangle, hit.u, hit.v, encoding);
+        return sample_texture(scene, ref, mesh, hit.triangle, hit.u, hit.v, encoding, footprint);
     };
-    const Vec4f base = base_color(scene, mesh, hit.triangle, hit.u, hit.v);
+    const Vec4f base = base_color(scene, mesh, hit.triangle, hit.u, hit.v, footprint);
 
     Substance s;
     s.material = &m;
@@ -183,11 +218,11 @@ Substance substance(const Scene& scene, const Placement& placement, const Hit& h
 }
 
 Vec3f mapped_normal(const Scene& scene, const Placement& placement, const Hit& hit, const SurfacePoint& point,
-                    const Material& material, Vec3f direction) {
+                    const Material& material, Vec3f direction, const Footprint& footprint) {
     const Mesh& mesh = *placement.mesh;
     const TextureRef& ref = material.normal_texture;
     if (!has_texture(scene, ref) || ref.uv_set > 1 || mesh.uv[ref.uv_set].empty()) return point.normal;
-    const Vec4f t = sample_texture(scene, ref, mesh, hit.triangle, hit.u, hit.v, Encoding::linear);
+    const Vec4f t = sample_texture(scene, ref, mesh, hit.triangle, hit.u, hit.v, Encoding::linear, footprint);
     const Vec3f local{(2 * t.x - 1) * material.normal_scale, (2 * t.y - 1) * material.normal_scale, 2 * t.z - 1};
 
     const Affine3f& m = placement.world_from_mesh;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "porthole/base/ids.h"
-#include "porthole/scene/scene.h"
+#include "porthole/scene/texture.h"
 
 namespace porthole {
 
@@ -65,12 +65,25 @@ struct Tint {
 /// Matte albedo is kept within these: what is darker reads as a hole, what is lighter clips.
 inline constexpr float kDarkest = 0.03f, kLightest = 0.85f;
 
-[[nodiscard]] Substance substance(const Scene& scene, const Placement& placement, const Hit& hit, Tint tint = {});
+/// What of a triangle a cone of rays covers that is `width` metres across where it meets it; a point on
+/// primitives. At grazing angles at most 32 times as long as wide.
+/// @param direction  unit, of the cone's axis.
+[[nodiscard]] Footprint footprint(const Placement& placement, const Hit& hit, Vec3f flat_normal, Vec3f direction,
+                                  float width);
+
+/// How much the directions of a surface's normals differ along it, radians a metre: of a mesh, across the
+/// triangle; 0 for primitives and flat shading.
+[[nodiscard]] float bending(const Placement& placement, const Hit& hit);
+
+/// @param footprint  over which textures are averaged.
+[[nodiscard]] Substance substance(const Scene& scene, const Placement& placement, const Hit& hit, Tint tint = {},
+                                  const Footprint& footprint = {});
 
 /// The normal with the normal map applied, on the viewer's side, never turned away from the
 /// viewer.
 [[nodiscard]] Vec3f mapped_normal(const Scene& scene, const Placement& placement, const Hit& hit,
-                                  const SurfacePoint& point, const Material& material, Vec3f direction);
+                                  const SurfacePoint& point, const Material& material, Vec3f direction,
+                                  const Footprint& footprint = {});
 
 /// `color` with its distance from grey multiplied; not below zero.
 [[nodiscard]] Vec3f saturated(Vec3f color, float factor);

@@ -119,7 +119,8 @@ struct Scene {
     std::vector<Part> parts;         ///< PartId i is parts[i], in the order of the file's tree
     std::vector<Material> materials; ///< at least one when there is a mesh
     std::vector<Texture> textures;
-    std::vector<Image<Rgba8>> images; ///< an empty image: could not be read (a warning says so)
+    std::vector<Image<Rgba8>> images;            ///< an empty image: could not be read (a warning says so)
+    std::vector<std::vector<Image<Rgba8>>> mips; ///< of each image its halves, quarters..., from build_mips(); or empty
     std::vector<Light> lights;
     std::vector<FileCamera> cameras;
     Vec3d origin{0, 0, 0}; ///< file coordinates = stored world coordinates + origin, metres

@@ -86,21 +86,75 @@ bool has_texture(const Scene& scene, const TextureRef& ref) {
     return image >= 0 && std::size_t(image) < scene.images.size() && !scene.images[std::size_t(image)].empty();
 }
 
-Vec4f sample_texture(const Scene& scene, const TextureRef& ref, Vec2f uv, Encoding encoding) {
-    if (!has_texture(scene, ref)) return {1, 1, 1, 1};
-    const Texture& texture = scene.textures[std::size_t(ref.texture)];
-    const Image<Rgba8>& image = scene.images[std::size_t(texture.image)];
-    const Vec2f p = transform_uv(ref, uv);
-    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return {1, 1, 1, 1};
+namespace {
+
+Vec4f look_up(const Image<Rgba8>& image, const Texture& texture, Vec2f p, bool nearest, Encoding encoding) {
     const int x0 = image.window().x0, y0 = image.window().y0;
-    const Tap a = make_tap(p.x, image.width(), texture.wrap_u, texture.nearest);
-    const Tap b = make_tap(p.y, image.height(), texture.wrap_v, texture.nearest);
-    if (texture.nearest) return texel(image, x0 + a.i0, y0 + b.i0, encoding);
+    const Tap a = make_tap(p.x, image.width(), texture.wrap_u, nearest);
+    const Tap b = make_tap(p.y, image.height(), texture.wrap_v, nearest);
+    if (nearest) return texel(image, x0 + a.i0, y0 + b.i0, encoding);
     const Vec4f top =
         texel(image, x0 + a.i0, y0 + b.i0, encoding) * (1 - a.f) + texel(image, x0 + a.i1, y0 + b.i0, encoding) * a.f;
     const Vec4f bottom =
         texel(image, x0 + a.i0, y0 + b.i1, encoding) * (1 - a.f) + texel(image, x0 + a.i1, y0 + b.i1, encoding) * a.f;
     return top * (1 - b.f) + bottom * b.f;
+}
+
+/// Between the levels of an image, 0 the image itself.
+Vec4f look_up(const Scene& scene, const Texture& texture, Vec2f p, float level, Encoding encoding) {
+    const std::size_t image = std::size_t(texture.image);
+    const auto& mips = scene.mips[image];
+    const float top = std::min(level, float(mips.size()));
+    const auto below = static_cast<std::size_t>(top);
+    const auto at = [&](std::size_t l) {
+        return l == 0 ? look_up(scene.images[image], texture, p, texture.nearest, encoding)
+                      : look_up(mips[l - 1], texture, p, false, encoding);
+    };
+    const float share = top - float(below);
+    if (!(share > 0)) return at(below);
+    return at(below) * (1 - share) + at(below + 1) * share;
+}
+
+} // namespace
+
+Vec4f sample_texture(const Scene& scene, const TextureRef& ref, Vec2f uv, Encoding encoding) {
+    if (!has_texture(scene, ref)) return {1, 1, 1, 1};
+    const Texture& texture = scene.textures[std::size_t(ref.texture)];
+    const Vec2f p = transform_uv(ref, uv);
+    if (!std::isfinite(p.x) || !std::isfinite(p.y)) return {1, 1, 1, 1};
+    return look_up(scene.images[std::size_t(texture.image)], texture, p, texture.nearest, encoding);
+}
+
+Vec4f sample_texture(const Scene& scene, const TextureRef& ref, const Mesh& mesh, std::uint32_t triangle, float u,
+                     float v, Encoding encoding, const Footprint& footprint) {
+    if (scene.mips.empty() || !has_texture(scene, ref) || !has_uv(mesh, ref.uv_set))
+        return sample_texture(scene, ref, mesh, triangle, u, v, encoding);
+    const Texture& texture = scene.textures[std::size_t(ref.texture)];
+    const Image<Rgba8>& image = scene.images[std::size_t(texture.image)];
+    const auto& uvs = mesh.uv[ref.uv_set];
+    const Vec3u t = mesh.triangles[triangle];
+    const Vec2f origin = transform_uv(ref, uvs[t.x]);
+    const Vec2f du = transform_uv(ref, uvs[t.y]) - origin, dv = transform_uv(ref, uvs[t.z]) - origin;
+    const auto axis = [&](Vec2f barycentric) { return du * barycentric.x + dv * barycentric.y; };
+    const auto texels = [&](Vec2f d) { return std::hypot(d.x * float(image.width()), d.y * float(image.height())); };
+    Vec2f along = axis(footprint.a);
+    float longer = texels(along), shorter = texels(axis(footprint.b));
+    if (shorter > longer) {
+        along = axis(footprint.b);
+        std::swap(longer, shorter);
+    }
+    if (!(longer > 1) || !std::isfinite(longer)) return sample_texture(scene, ref, mesh, triangle, u, v, encoding);
+    const float width = std::max({shorter, longer / float(kMostProbes), 1.0f});
+    const int probes = std::clamp(int(std::ceil(longer / width - 0.25f)), 1, kMostProbes);
+    const float level = std::log2(probes == 1 ? longer : width);
+    const Vec2f middle = transform_uv(ref, interpolate_uv(mesh, triangle, u, v, ref.uv_set));
+    if (!std::isfinite(middle.x) || !std::isfinite(middle.y)) return {1, 1, 1, 1};
+    Vec4f sum{0, 0, 0, 0};
+    for (int i = 0; i < probes; ++i) {
+        const float at = (float(i) + 0.5f) / float(probes) - 0.5f;
+        sum = sum + look_up(scene, texture, middle + along * at, level, encoding);
+    }
+    return sum * (1.0f / float(probes));
 }
 
 Vec4f sample_texture(const Scene& scene, const TextureRef& ref, const Mesh& mesh, std::uint32_t triangle, float u,
@@ -114,9 +168,10 @@ Vec4f vertex_color(const Mesh& mesh, std::uint32_t triangle, float u, float v) {
     return corners(mesh.colors, mesh.triangles[triangle], u, v);
 }
 
-Vec4f base_color(const Scene& scene, const Mesh& mesh, std::uint32_t triangle, float u, float v) {
+Vec4f base_color(const Scene& scene, const Mesh& mesh, std::uint32_t triangle, float u, float v,
+                 const Footprint& footprint) {
     const Material& material = scene.materials[mesh.material_of(triangle)];
-    const Vec4f t = sample_texture(scene, material.base_color_texture, mesh, triangle, u, v, Encoding::srgb);
+    const Vec4f t = sample_texture(scene, material.base_color_texture, mesh, triangle, u, v, Encoding::srgb, footprint);
     const Vec4f c = vertex_color(mesh, triangle, u, v);
     const Vec4f f = material.base_color;
     return {f.x * t.x * c.x, f.y * t.y * c.y, f.z * t.z * c.z, f.w * t.w * c.w};
