@@ -9,6 +9,7 @@ namespace {
 constexpr float kBorrowNormal = 0.9f;
 constexpr float kBorrowStep = 1.5f; ///< pixels off the tangent plane
 constexpr int kHoleFactor = 2;      ///< in the hole every sample that a pixel may have counts as two
+constexpr float kConeShare = 0.7f;  ///< of a pixel's width
 constexpr int kFirstLevel = 4;      ///< samples of the first level; each level has twice as many
 constexpr float kBeside = 0.5f;     ///< an edge beside a pixel whose samples agree counts this much
 
@@ -42,9 +43,10 @@ PathRay camera_path(const View& view, Vec3f direction, float depth, std::uint32_
     ray.direction = direction;
     ray.slot = slot;
     ray.in_hole = in_hole;
-    // The cone of a pixel, also for one of its samples: they are fewer where textures alone differ.
-    ray.width = view.pixel_size(depth);
-    ray.widening = view.orthographic ? 0.0f : view.pixel_scale();
+    // The cone of a pixel, also for one of its samples: they are fewer where textures alone differ. Trilinear
+    // look-ups see more than the ellipse they are meant for: on real models less is nearer to the truth.
+    ray.width = kConeShare * view.pixel_size(depth);
+    ray.widening = view.orthographic ? 0.0f : kConeShare * view.pixel_scale();
     return ray;
 }
 
