@@ -1,13 +1,9 @@
-#include "instances.h"
-
-#include <benchmark/benchmark.h>
-
 #include <memory>
 #include <random>
 
-#include "porthole/plan.h"
-#include "porthole/render/render.h"
+#include "benchmarks.h"
 #include "porthole/scene/camera.h"
+#include "scenes.h"
 #include "support/shapes.h"
 
 namespace porthole::bench {
@@ -40,55 +36,48 @@ Scene many_balls(int across) {
 }
 
 /// All threads, as what is wanted is a time.
-struct Stage {
+struct Balls {
     Scene scene;
     std::unique_ptr<MeshBvhs> meshes;
     std::unique_ptr<Bvh> bvh;
     View view;
 
-    explicit Stage(int across) : scene(many_balls(across)) {
+    explicit Balls(int across) : scene(many_balls(across)) {
         meshes = std::make_unique<MeshBvhs>(build_mesh_bvhs(scene));
         bvh = std::make_unique<Bvh>(build_bvh(*meshes, all_parts(scene)));
         view = view_from_direction(frame_subject(scene, {}), {1.0f, 0.8f, 1.0f}, {}, kWidth, kHeight);
     }
 };
 
-const Stage& stage(int across) {
-    static std::unique_ptr<Stage> many, one;
-    std::unique_ptr<Stage>& s = across == 1 ? one : many;
-    if (!s) s = std::make_unique<Stage>(across);
+const Balls& balls(int across) {
+    static std::unique_ptr<Balls> many, one;
+    std::unique_ptr<Balls>& s = across == 1 ? one : many;
+    if (!s) s = std::make_unique<Balls>(across);
     return *s;
 }
 
-void add(const char* name, void (*function)(benchmark::State&, int), int across) {
-    benchmark::RegisterBenchmark(name, function, across)
-        ->Unit(benchmark::kMillisecond)
-        ->MeasureProcessCPUTime()
-        ->UseRealTime();
-}
-
 void build(benchmark::State& state, int across) {
-    const Stage& s = stage(across);
+    const Balls& s = balls(across);
     for (auto _ : state) benchmark::DoNotOptimize(build_mesh_bvhs(s.scene));
 }
 
 void top(benchmark::State& state, int across) {
-    const Stage& s = stage(across);
+    const Balls& s = balls(across);
     for (auto _ : state) benchmark::DoNotOptimize(build_bvh(*s.meshes, all_parts(s.scene)));
 }
 
 void bounds(benchmark::State& state, int across) {
-    const Stage& s = stage(across);
+    const Balls& s = balls(across);
     for (auto _ : state) benchmark::DoNotOptimize(scene_bounds(s.scene));
 }
 
 void ids(benchmark::State& state, int across) {
-    const Stage& s = stage(across);
+    const Balls& s = balls(across);
     for (auto _ : state) benchmark::DoNotOptimize(trace_ids(*s.bvh, s.view, s.view.window()));
 }
 
 void draw(benchmark::State& state, int across, const RenderParams& look) {
-    const Stage& s = stage(across);
+    const Balls& s = balls(across);
     for (auto _ : state) benchmark::DoNotOptimize(render(*s.bvh, nullptr, s.view, look, nullptr, nullptr));
 }
 
@@ -103,16 +92,22 @@ void frame(benchmark::State& state, int across) { draw(state, across, {}); }
 
 } // namespace
 
-void add_instances() {
-    add("instances/build", build, kAcross);
-    add("instances/top", top, kAcross);
-    add("instances/bounds", bounds, kAcross);
-    add("instances/ids", ids, kAcross);
-    add("instances/direct_frame", direct_frame, kAcross);
-    add("instances/rough_frame", rough_frame, kAcross);
-    add("instances/frame", frame, kAcross);
-    add("instances/one_ids", ids, 1);
-    add("instances/one_frame", frame, 1);
+void add_instances(const Settings& settings) {
+    if (settings.quick) return;
+    const auto add_part = [](const std::string& what, auto function, int across) {
+        add("instances/" + std::to_string(across * across * across) + '/' + what, [=](benchmark::State& state) {
+            function(state, across);
+        })->UseRealTime();
+    };
+    add_part("build", build, kAcross);
+    add_part("top", top, kAcross);
+    add_part("bounds", bounds, kAcross);
+    add_part("ids", ids, kAcross);
+    add_part("direct_frame", direct_frame, kAcross);
+    add_part("rough_frame", rough_frame, kAcross);
+    add_part("frame", frame, kAcross);
+    add_part("ids", ids, 1);
+    add_part("frame", frame, 1);
 }
 
 } // namespace porthole::bench
