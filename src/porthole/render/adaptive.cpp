@@ -14,6 +14,7 @@ constexpr float kDepthError = 1.0f;     ///< the same, pixels
 constexpr float kAmbientStep = 0.25f;   ///< of the open share, from block to block
 constexpr float kLampStep = 0.02f;      ///< of the lamps' share
 constexpr float kSmooth = 0.9f;         ///< cosine between normals of one surface
+constexpr float kFlat = 0.98f;          ///< the same, within a block of which corners tell the rest
 constexpr float kOneSurface = 0.8f;     ///< the same, farther apart
 constexpr float kOffPlane = 1.5f;       ///< pixels by which neighbours of one surface leave its plane
 constexpr float kLeastRoughness = 0.3f; ///< smoother materials may mirror what is around them
@@ -56,12 +57,12 @@ public:
     }
 
     BlockMap run() {
-        trace_level(0);
-        decide_cells(0);
-        trace_level(1);
-        decide_cells(1);
+        for (int level = 0; level < LatticeAxis::kLevels; ++level) {
+            trace_level(level);
+            decide_cells(level);
+        }
         settle_cells();
-        trace_level(2);
+        trace_differing();
         trace_blocks(seeds());
         for (std::vector<Vec2i> fresh = traced_blocks(); !fresh.empty();) fresh = trace_blocks(contradicted_by(fresh));
         take_light();
@@ -74,8 +75,10 @@ private:
     void summarise(int bx, int by, bool corners);
     void color_corners(int bx, int by);
     void trace_level(int level);
+    void trace_differing();
+    void assume(int bx, int by, int level);
     void decide_cells(int level);
-    [[nodiscard]] BlockMap::Cell agreement(Vec2i a, Vec2i b) const;
+    [[nodiscard]] BlockMap::Cell agreement(int level, Vec2i a, Vec2i b) const;
     [[nodiscard]] bool is_straight(Vec2i a, Vec2i b) const;
     [[nodiscard]] std::vector<Vec2i> seeds() const;
     [[nodiscard]] std::vector<Vec2i> seeds_of(PartId part) const;
@@ -88,6 +91,7 @@ private:
     bool light_fits(int bx, int by);
     void settle();
     void infer_surface(int bx, int by, bool light);
+    void infer_normal(const Surrounding& around, int x, int y);
     Picture& picture_;
     const Stage& stage_;
     bool everything_;
@@ -165,24 +169,67 @@ void Refinement::color_corners(int bx, int by) {
             }
             picture_.color(x, y) = display_color(radiance, picture_.params.background);
         }
+    const Vec3f normal = unpack_normal(picture_.buffer.pixels(r.x0, r.y0).normal);
+    bool flat = true;
+    for (int y = r.y0; y < r.y1; ++y)
+        for (int x = r.x0; x < r.x1; ++x)
+            flat = flat && dot(unpack_normal(picture_.buffer.pixels(x, y).normal), normal) >= kFlat;
+    map_.summary(bx, by).has_corners = flat;
+}
+
+/// Calls body(bx, by) for the blocks of a tile.
+template <typename Body> void for_blocks(Rect tile, Body&& body) {
+    const Rect blocks = blocks_of(tile);
+    for (int by = blocks.y0; by < blocks.y1; ++by)
+        for (int bx = blocks.x0; bx < blocks.x1; ++bx) body(bx, by);
 }
 
 void Refinement::trace_level(int level) {
     for_tiles(picture_, control_, [&](Rect tile) {
         std::vector<Vec2i> todo;
-        const Rect blocks = blocks_of(tile);
-        for (int by = blocks.y0; by < blocks.y1; ++by)
-            for (int bx = blocks.x0; bx < blocks.x1; ++bx) {
-                if (map_.state(bx, by) != BlockMap::wanted) continue;
-                if (level < LatticeAxis::kLevels &&
-                    !(map_.columns.on_lattice(level, bx) && map_.rows.on_lattice(level, by)))
-                    continue;
-                if (level == 1 && map_.allowed(0, bx, by) != BlockMap::differs) continue;
-                if (level == 2 && map_.allows(bx, by) != BlockMap::differs) continue;
-                todo.push_back({bx, by});
+        for_blocks(tile, [&](int bx, int by) {
+            if (map_.state(bx, by) != BlockMap::wanted) return;
+            if (!map_.columns.on_lattice(level, bx) || !map_.rows.on_lattice(level, by)) return;
+            if (level > 0) {
+                if (map_.allowed(level - 1, bx, by) != BlockMap::differs) return;
+                if (map_.between_two(level - 1, bx, by) == BlockMap::one_color) return assume(bx, by, level - 1);
             }
-        trace(todo, level < LatticeAxis::kLevels);
+            todo.push_back({bx, by});
+        });
+        trace(todo, true);
     });
+}
+
+void Refinement::trace_differing() {
+    for_tiles(picture_, control_, [&](Rect tile) {
+        std::vector<Vec2i> todo;
+        for_blocks(tile, [&](int bx, int by) {
+            if (map_.state(bx, by) == BlockMap::wanted && map_.allows(bx, by) == BlockMap::differs)
+                todo.push_back({bx, by});
+        });
+        trace(todo, false);
+    });
+}
+
+/// A block between two of a lattice that agree joins the next lattice without being traced.
+void Refinement::assume(int bx, int by, int level) {
+    map_.level(bx, by) = std::uint8_t(level);
+    map_.allows(bx, by) = BlockMap::one_color;
+    const Surrounding around(map_, bx, by);
+    const Rect r = map_.pixels(bx, by);
+    BlockSummary s = map_.summary(around.block[0].x, around.block[0].y);
+    const auto mix = [&](auto&& value) { return around.mix_blocks(map_, r.x0, r.y0, value); };
+    s.open = mix([](const BlockSummary& b) { return b.open; });
+    s.all = mix([](const BlockSummary& b) { return b.all; });
+    for (int c = 0; c < 3; ++c) s.lamps[c] = mix([c](const BlockSummary& b) { return b.lamps[c]; });
+    map_.summary(bx, by) = s;
+    if (s.key == GBuffer::kNoKey) return;
+    infer_surface(bx, by, false);
+    for (const int y : {r.y0, r.y1 - 1})
+        for (const int x : {r.x0, r.x1 - 1}) {
+            infer_normal(around, x, y);
+            picture_.color(x, y) = around.mix(x, y, [&](int cx, int cy) { return picture_.color(cx, cy); });
+        }
 }
 
 void Refinement::decide_cells(int level) {
@@ -192,21 +239,22 @@ void Refinement::decide_cells(int level) {
         const int row = int(k), by = rows.block(level, row);
         for (int cx = 0; cx < across.width(); ++cx) {
             const auto [left, right] = columns.cell(level, cx);
-            across(cx, row) = agreement({left, by}, {right, by});
+            across(cx, row) = agreement(level, {left, by}, {right, by});
         }
         if (row >= rows.cells(level)) return;
         const auto [top, bottom] = rows.cell(level, row);
         for (int column = 0; column < down.width(); ++column) {
             const int bx = columns.block(level, column);
-            down(column, row) = agreement({bx, top}, {bx, bottom});
+            down(column, row) = agreement(level, {bx, top}, {bx, bottom});
         }
     });
     parallel_for(std::size_t(cells.height()), control_, [&](std::size_t k) {
         const int cy = int(k), below = std::min(cy + 1, across.height() - 1);
         for (int cx = 0; cx < cells.width(); ++cx) {
             const int right = std::min(cx + 1, down.width() - 1);
-            const std::uint8_t parent =
-                level > 0 ? map_.cells[0](columns.parent(cx), rows.parent(cy)) : std::uint8_t(BlockMap::differs);
+            const std::uint8_t parent = level > 0
+                                            ? map_.cells[level - 1](columns.parent(level, cx), rows.parent(level, cy))
+                                            : std::uint8_t(BlockMap::differs);
             cells(cx, cy) = parent != BlockMap::differs
                                 ? parent
                                 : std::min({across(cx, cy), across(cx, below), down(cx, cy), down(right, cy)});
@@ -220,7 +268,7 @@ void Refinement::settle_cells() {
     parallel_for(std::size_t(area.height()), control_, [&](std::size_t row) {
         const int by = area.y0 + int(row);
         for (int bx = area.x0; bx < area.x1; ++bx) {
-            if (map_.state(bx, by) != BlockMap::wanted) continue;
+            if (map_.state(bx, by) != BlockMap::wanted || map_.allows(bx, by) != BlockMap::differs) continue;
             for (int level = 0; level < LatticeAxis::kLevels; ++level) {
                 const BlockMap::Cell cell = map_.allowed(level, bx, by);
                 if (cell == BlockMap::differs) continue;
@@ -232,8 +280,7 @@ void Refinement::settle_cells() {
     });
 }
 
-BlockMap::Cell Refinement::agreement(Vec2i a, Vec2i b) const {
-    if (!map_.is_traced(a.x, a.y) || !map_.is_traced(b.x, b.y)) return BlockMap::differs;
+BlockMap::Cell Refinement::agreement(int level, Vec2i a, Vec2i b) const {
     const BlockSummary &sa = map_.summary(a.x, a.y), &sb = map_.summary(b.x, b.y);
     if (!sa.uniform || !sb.uniform || sa.key != sb.key || sa.material != sb.material) return BlockMap::differs;
     if (sa.key == GBuffer::kNoKey) return everything_ ? BlockMap::one_color : BlockMap::one_light;
@@ -241,7 +288,10 @@ BlockMap::Cell Refinement::agreement(Vec2i a, Vec2i b) const {
         return BlockMap::differs;
     for (int c = 0; c < 3; ++c)
         if (std::abs(sa.lamps[c] - sb.lamps[c]) > 255.0f * kLampStep) return BlockMap::differs;
-    return sa.interpolable && is_straight(a, b) ? BlockMap::one_color : BlockMap::one_light;
+    if (!sa.interpolable) return BlockMap::one_light;
+    if (is_straight(a, b)) return BlockMap::one_color;
+    // Nearer blocks may be straight.
+    return level == LatticeAxis::kFinest ? BlockMap::one_light : BlockMap::differs;
 }
 
 /// Whether colour and depth run so straight from block to block that what lies between can be
@@ -448,6 +498,12 @@ bool Refinement::light_fits(int bx, int by) {
     return true;
 }
 
+void Refinement::infer_normal(const Surrounding& around, int x, int y) {
+    SparseImage<Pixel>& pixels = picture_.buffer.pixels;
+    const auto normal = [&](int cx, int cy) { return unpack_normal(pixels(cx, cy).normal); };
+    pixels(x, y).normal = pack_normal(normalize(around.mix(x, y, normal), normal(around.left_of(x), around.top_of(y))));
+}
+
 /// What pixels of a block take from the lattice: their surface unless it is traced, and their light.
 void Refinement::infer_surface(int bx, int by, bool light) {
     GBuffer& buffer = picture_.buffer;
@@ -468,10 +524,7 @@ void Refinement::infer_surface(int bx, int by, bool light) {
             }
             if (!light) continue;
             Pixel& p = buffer.pixels(x, y);
-            const auto normal = [&](int cx, int cy) { return unpack_normal(buffer.pixels(cx, cy).normal); };
-            if (surface)
-                p.normal =
-                    pack_normal(normalize(around.mix(x, y, normal), normal(around.left_of(x), around.top_of(y))));
+            if (surface) infer_normal(around, x, y);
             const auto rounded = [&](auto&& value) { return std::lround(around.mix_blocks(map_, x, y, value)); };
             p.ambient_open = std::uint16_t(rounded([](const BlockSummary& s) { return s.open; }));
             p.ambient_all = std::uint16_t(rounded([](const BlockSummary& s) { return s.all; }));
@@ -491,15 +544,11 @@ void Refinement::settle() {
                 if (is(x, y)) return true;
         return false;
     };
-    const auto for_blocks = [&](auto&& body) {
-        for_tiles(picture_, control_, [&](Rect tile) {
-            const Rect blocks = blocks_of(tile);
-            for (int by = blocks.y0; by < blocks.y1; ++by)
-                for (int bx = blocks.x0; bx < blocks.x1; ++bx) body(bx, by);
-        });
+    const auto for_all = [&](auto&& body) {
+        for_tiles(picture_, control_, [&](Rect tile) { for_blocks(tile, body); });
     };
     Mask alone(area);
-    for_blocks([&](int bx, int by) {
+    for_all([&](int bx, int by) {
         if (!map_.is_traced(bx, by)) return;
         const BlockSummary& s = map_.summary(bx, by);
         if (!s.uniform || !s.evenly_lit) return;
@@ -514,16 +563,18 @@ void Refinement::settle() {
                 p.ambient_all = std::uint16_t(std::lround(s.all));
             }
     });
-    for_blocks([&](int bx, int by) {
+    for_all([&](int bx, int by) {
         if (alone(bx, by)) map_.state(bx, by) = BlockMap::settled;
     });
-    for_blocks([&](int bx, int by) {
-        if (!map_.is_inferred(bx, by)) return;
-        infer_surface(bx, by, any_around(bx, by, [&](int x, int y) {
-                          return map_.state(x, y) == BlockMap::traced ||
-                                 (map_.state(x, y) == BlockMap::wanted && !map_.is_inferred(x, y));
-                      }));
-    });
+    // What follows from the finer lattices may follow from what follows from the coarser ones.
+    for (int level = 0; level < LatticeAxis::kLevels; ++level)
+        for_all([&](int bx, int by) {
+            if (!map_.is_inferred(bx, by) || map_.level(bx, by) != level) return;
+            infer_surface(bx, by, any_around(bx, by, [&](int x, int y) {
+                              return map_.state(x, y) == BlockMap::traced ||
+                                     (map_.state(x, y) == BlockMap::wanted && !map_.is_inferred(x, y));
+                          }));
+        });
 }
 
 } // namespace
@@ -549,12 +600,16 @@ BlockMap::BlockMap(const Picture& picture)
         }
 }
 
+BlockMap::Cell BlockMap::between_two(int lattice, int bx, int by) const {
+    const bool in_column = columns.on_lattice(lattice, bx), in_row = rows.on_lattice(lattice, by);
+    if (in_column == in_row) return differs;
+    const int column = columns.index(lattice, bx), row = rows.index(lattice, by);
+    return Cell(in_row ? across[lattice](column, row) : down[lattice](column, row));
+}
+
 BlockMap::Cell BlockMap::allowed(int lattice, int bx, int by) const {
     const LatticeAxis::Place x = columns.place(lattice, bx), y = rows.place(lattice, by);
-    if (lattice == LatticeAxis::kLevels - 1 && (x.low == bx) != (y.low == by)) {
-        const int column = columns.index(lattice, bx), row = rows.index(lattice, by);
-        return Cell(y.low == by ? across[lattice](column, row) : down[lattice](column, row));
-    }
+    if (lattice == LatticeAxis::kFinest && (x.low == bx) != (y.low == by)) return between_two(lattice, bx, by);
     std::uint8_t least = one_color;
     for (int cy = y.cell_low; cy <= y.cell_high; ++cy)
         for (int cx = x.cell_low; cx <= x.cell_high; ++cx) least = std::min(least, cells[lattice](cx, cy));
@@ -585,11 +640,41 @@ BlockMap gather_adaptive(Picture& picture, const Stage& stage, bool everything, 
     return Refinement(picture, stage, everything, control).run();
 }
 
-void infer_colors(Picture& picture, const BlockMap& map, Rect tile) {
+void shade_blocks(Picture& picture, const Stage& stage, const BlockMap& map, Rect tile) {
+    GBuffer& buffer = picture.buffer;
+    std::vector<Vec2i> todo;
     const Rect area = blocks_of(tile);
     for (int by = area.y0; by < area.y1; ++by)
         for (int bx = area.x0; bx < area.x1; ++bx) {
-            if (!map.is_inferred(bx, by)) continue;
+            if (map.state(bx, by) == BlockMap::unused || map.is_inferred(bx, by)) continue;
+            const Rect r = map.pixels(bx, by);
+            if (map.state(bx, by) != BlockMap::settled || !map.summary(bx, by).has_corners) {
+                for (int y = r.y0; y < r.y1; ++y)
+                    for (int x = r.x0; x < r.x1; ++x)
+                        if (buffer.pixels(x, y).has(Pixel::traced)) todo.push_back({x, y});
+                continue;
+            }
+            const Vec4f a = picture.color(r.x0, r.y0), b = picture.color(r.x1 - 1, r.y0);
+            const Vec4f c = picture.color(r.x0, r.y1 - 1), d = picture.color(r.x1 - 1, r.y1 - 1);
+            const PixelLight light(buffer.pixels(r.x0, r.y0).reach()); // of all its pixels
+            for (int y = r.y0; y < r.y1; ++y) {
+                const float ty = r.height() > 1 ? float(y - r.y0) / float(r.height() - 1) : 0.0f;
+                const Vec4f left = a + (c - a) * ty, right = b + (d - b) * ty;
+                for (int x = r.x0; x < r.x1; ++x) {
+                    const float tx = r.width() > 1 ? float(x - r.x0) / float(r.width() - 1) : 0.0f;
+                    picture.color(x, y) = left + (right - left) * tx;
+                    buffer.light(x, y) = light;
+                }
+            }
+        }
+    shade_pixels(picture, stage, tile, todo);
+}
+
+void infer_colors(Picture& picture, const BlockMap& map, int level, Rect tile) {
+    const Rect area = blocks_of(tile);
+    for (int by = area.y0; by < area.y1; ++by)
+        for (int bx = area.x0; bx < area.x1; ++bx) {
+            if (!map.is_inferred(bx, by) || map.level(bx, by) != level) continue;
             const Rect r = map.pixels(bx, by);
             const Surrounding around(map, bx, by);
             for (int y = r.y0; y < r.y1; ++y) std::fill_n(&picture.inferred(r.x0, y), r.width(), std::uint8_t{1});

@@ -23,7 +23,7 @@ struct BlockSummary {
     bool uniform = false;      ///< one key and material, and no crease
     bool evenly_lit = false;   ///< by the lamps
     bool interpolable = false; ///< colours of its material follow from geometry and light alone
-    bool cornered = false;     ///< its corners have colours from which the rest follows, if it settles
+    bool has_corners = false;  ///< its corner pixels have the colours that its mean light gives them
     [[nodiscard]] float ambient() const { return all > 0 ? open / all : 1.0f; }
 };
 
@@ -60,6 +60,8 @@ struct BlockMap {
     [[nodiscard]] bool is_inferred(int bx, int by) const {
         return state(bx, by) == wanted && allows(bx, by) == one_color;
     }
+    /// What two blocks of a lattice allow for one on the line between them; differs elsewhere.
+    [[nodiscard]] Cell between_two(int lattice, int bx, int by) const;
     /// What a lattice allows for a block: the least of the cells around it, but on the line
     /// between two blocks of the finest lattice what these two allow.
     [[nodiscard]] Cell allowed(int lattice, int bx, int by) const;
@@ -109,7 +111,12 @@ struct Surrounding {
 /// The same bits for any number of threads.
 [[nodiscard]] BlockMap gather_adaptive(Picture& picture, const Stage& stage, bool everything, const Control& control);
 
-/// Colours of the pixels of `tile` that are inferred altogether, once those of traced ones are there.
-void infer_colors(Picture& picture, const BlockMap& map, Rect tile);
+/// Pass 2 in place of shade_tile(): shades what is traced, but of blocks that stand alone on a smooth
+/// surface only the corners, between which their other pixels lie.
+void shade_blocks(Picture& picture, const Stage& stage, const BlockMap& map, Rect tile);
+
+/// Colours of the pixels of `tile` that are inferred altogether from the lattice of `level`, once
+/// those of traced pixels and of coarser levels are there.
+void infer_colors(Picture& picture, const BlockMap& map, int level, Rect tile);
 
 } // namespace porthole

@@ -6,15 +6,12 @@
 namespace porthole {
 
 LatticeAxis::LatticeAxis(int first, int last) : first_(first) {
-    assert(first <= last);
-    std::vector<int>& coarse = blocks_[0];
-    coarse.push_back(first);
-    for (int b = (first & ~3) + 4; b < last; b += 4) coarse.push_back(b);
-    if (last > first) coarse.push_back(last);
-    std::vector<int>& fine = blocks_[1];
-    for (std::size_t k = 0; k < coarse.size(); ++k) {
-        fine.push_back(coarse[k]);
-        if (k + 1 < coarse.size() && coarse[k + 1] - coarse[k] > 2) fine.push_back(coarse[k] + 2);
+    assert(first >= 0 && first <= last);
+    for (int level = 0; level < kLevels; ++level) {
+        const int stride = 8 >> level;
+        blocks_[level].push_back(first);
+        for (int b = (first / stride + 1) * stride; b < last; b += stride) blocks_[level].push_back(b);
+        if (last > first) blocks_[level].push_back(last);
     }
     for (int level = 0; level < kLevels; ++level) {
         int k = 0;
@@ -40,6 +37,8 @@ LatticeAxis::Place LatticeAxis::place(int level, int block) const {
     return {low, b[std::size_t(k + 1)], k, k};
 }
 
-int LatticeAxis::parent(int cell) const { return place(0, blocks_[1][std::size_t(cell)]).cell_high; }
+int LatticeAxis::parent(int level, int cell) const {
+    return place(level - 1, blocks_[level][std::size_t(cell)]).cell_high;
+}
 
 } // namespace porthole

@@ -6,11 +6,11 @@
 
 namespace porthole {
 
-/// One axis of the lattices: level 0 has every fourth block, level 1 every second, and both the
-/// first and the last one. Blocks are numbered as in the picture: pixel / 4.
+/// One axis of the lattices: level 0 has every eighth block, level 1 every fourth, level 2 every
+/// second, and all of them the first and the last one. Blocks are numbered as in the picture: pixel / 4.
 class LatticeAxis {
 public:
-    static constexpr int kLevels = 2;
+    static constexpr int kLevels = 3, kFinest = kLevels - 1;
 
     /// Blocks first..last, both included.
     LatticeAxis(int first, int last);
@@ -30,7 +30,7 @@ public:
     /// Cells lie between neighbouring lattice blocks; there is at least one.
     [[nodiscard]] int cells(int level) const;
     [[nodiscard]] std::pair<int, int> cell(int level, int index) const; ///< its first and last block
-    [[nodiscard]] int parent(int cell) const;                           ///< the level-0 cell that holds a level-1 one
+    [[nodiscard]] int parent(int level, int cell) const;                ///< the cell of the level above that holds it
 
 private:
     int first_;

@@ -27,13 +27,13 @@ struct Picture {
     const RenderParams& params;
     const Camera& camera;
     GBuffer buffer;
-    Image<Vec4f> color; ///< display-linear, premultiplied; the buffer's window
-    Mask edges;         ///< not 0 where the first sample is not enough: see find_edges()
+    Image<Vec4f> color;      ///< display-linear, premultiplied; the buffer's window
+    Mask edges;              ///< not 0 where the first sample is not enough: see find_edges()
     bool everything = false; ///< every pixel is wanted, but for those covered
-    Mask covered;       ///< 1 where only the ids are wanted; empty: nowhere
-    Mask opened;        ///< with a cut: 1 where some sample is in the hole
-    Mask known;         ///< of the paper's refinement: 1 where the first sample is traced, whether shaded or not
-    Mask inferred;      ///< 1 where the ids were not traced; empty: nowhere
+    Mask covered;            ///< 1 where only the ids are wanted; empty: nowhere
+    Mask opened;             ///< with a cut: 1 where some sample is in the hole
+    Mask known;              ///< of the paper's refinement: 1 where the first sample is traced, whether shaded or not
+    Mask inferred;           ///< 1 where the ids were not traced; empty: nowhere
     RayTotals rays;
 
     Picture(const View& seen, const RenderParams& how, const Camera& by, Rect window)
@@ -67,7 +67,10 @@ std::optional<SurfacePoint> record(Picture& picture, const std::vector<Placement
 /// Pass 1: camera rays through the pixel centres, their shadow and ambient rays.
 void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile);
 
-/// Pass 2: filters the light and shades the first samples.
+/// Filters the light of traced pixels of `tile` and shades their first samples.
+void shade_pixels(Picture& picture, const Stage& stage, Rect tile, std::span<const Vec2i> pixels);
+
+/// Pass 2: shade_pixels() for all that are traced.
 void shade_tile(Picture& picture, const Stage& stage, Rect tile);
 
 /// Pass 3: marks traced pixels whose first sample is not enough: those that differ from a neighbour

@@ -154,13 +154,17 @@ Rect grainy(const GBuffer& buffer, Rect tile) {
 } // namespace
 
 void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
-    GBuffer& buffer = picture.buffer;
-    const bool flat = picture.params.shading == Shading::flat;
     std::vector<Vec2i> todo;
     for (int y = tile.y0; y < tile.y1; ++y)
         for (int x = tile.x0; x < tile.x1; ++x)
-            if (buffer.pixels(x, y).has(Pixel::traced)) todo.push_back({x, y});
+            if (picture.buffer.pixels(x, y).has(Pixel::traced)) todo.push_back({x, y});
+    shade_pixels(picture, stage, tile, todo);
+}
+
+void shade_pixels(Picture& picture, const Stage& stage, Rect tile, std::span<const Vec2i> todo) {
     if (todo.empty()) return;
+    GBuffer& buffer = picture.buffer;
+    const bool flat = picture.params.shading == Shading::flat;
     RayCounts rays;
     FilteredTile filtered;
     if (!flat)

@@ -111,10 +111,16 @@ void draw(Picture& picture, const Bvh& bvh, const Bvh* targets, const Cut* cut, 
     if (selective) {
         draw_selectively(picture, stage, control);
     } else {
-        passes.run(0.2, [&](Rect tile) { shade_tile(picture, stage, tile); });
+        passes.run(0.2, [&](Rect tile) {
+            if (map)
+                shade_blocks(picture, stage, *map, tile);
+            else
+                shade_tile(picture, stage, tile);
+        });
         if (map) {
             picture.inferred = Mask(picture.buffer.window());
-            passes.run(0, [&](Rect tile) { infer_colors(picture, *map, tile); });
+            for (int level = 0; level < LatticeAxis::kLevels; ++level)
+                passes.run(0, [&](Rect tile) { infer_colors(picture, *map, level, tile); });
         }
     }
     if (params.samples > 1 && !selective) {
