@@ -18,10 +18,11 @@ import sys
 # One benchmark: medians in seconds and the medians of its counters; `error` if it failed.
 Result = collections.namedtuple("Result", "cpu wall counters error", defaults=({}, None))
 
-# One figure of a row. `wanted` is (">=" or "<=", bar); `aim` is beyond the bar and only told.
-Figure = collections.namedtuple("Figure", "text value wanted aim", defaults=(None, None))
+# One figure of a row: its value as text, its unit. `wanted` is (">=" or "<=", bar) for the value; `aim` is beyond
+# the bar and only told.
+Figure = collections.namedtuple("Figure", "number unit value wanted aim", defaults=("", None, None, None))
 
-Row = collections.namedtuple("Row", "what figures")
+Row = collections.namedtuple("Row", "what figures failed", defaults=(False,))
 
 COMPARE = {">=": operator.ge, "<=": operator.le}
 NOT_COUNTERS = {"family_index", "per_family_instance_index", "repetitions", "repetition_index", "threads", "iterations",
@@ -50,15 +51,15 @@ def read_results(report):
 
 
 def times(value, wanted=None, aim=None):
-    return Figure(f"{value:.3g}x" if value < 100 else f"{value:.0f}x", value, wanted, aim)
+    return Figure(f"{value:.3g}" if value < 100 else f"{value:.0f}", "x", value, wanted, aim)
 
 
 def share(value, wanted=None, aim=None):
-    return Figure(f"{value:.2f}", value, wanted, aim)
+    return Figure(f"{value:.2f}", "", value, wanted, aim)
 
 
-def counter(result, name, form, wanted=None):
-    return Figure(form.format(result.counters[name]), result.counters[name], wanted)
+def counter(result, name, digits, unit, wanted=None):
+    return Figure(f"{result.counters[name]:.{digits}f}", unit, result.counters[name], wanted)
 
 
 class Table:
@@ -96,10 +97,10 @@ class Table:
                 aim = 2
             yield Row(f"{scene}, {size}, {samples} sample{'s' if samples > 1 else ''}", [
                 times(full.cpu / found.cpu, wanted, aim),
-                counter(found, "dB", "{:.1f} dB", (">=", 45)),
-                counter(found, "wrong_ids_%", "{:.4f} % wrong ids", ("<=", 0.001)),
-                counter(found, "missed", "{:.0f} parts missed", ("<=", 0)),
-                counter(found, "traced_%", "{:.0f} % traced"),
+                counter(found, "dB", 1, " dB", (">=", 45)),
+                counter(found, "wrong_ids_%", 4, " % wrong ids", ("<=", 0.001)),
+                counter(found, "missed", 0, " parts missed", ("<=", 0)),
+                counter(found, "traced_%", 0, " % traced"),
             ])
 
     def antialias(self):
@@ -110,12 +111,12 @@ class Table:
             if good:
                 best, samples = min(good, key=lambda e: e[0].cpu)
                 note = f"{best.counters['dB']:.1f} dB with {samples} samples, uniform {uniform.counters['dB']:.1f} dB"
-                yield Row(m[1], [share(best.cpu / uniform.cpu, ("<=", 0.35)), Figure(note, None)])
+                yield Row(m[1], [share(best.cpu / uniform.cpu, ("<=", 0.35)), Figure(note)])
             elif edges:
                 best, samples = max(edges, key=lambda e: e[0].counters["dB"])
                 note = (f"at most {best.counters['dB']:.1f} dB, with {samples} samples, in "
                         f"{best.cpu / uniform.cpu:.2f} of the time; uniform {uniform.counters['dB']:.1f} dB")
-                yield Row(m[1], [Figure(note, float("inf"), ("<=", 0.35))])
+                yield Row(m[1], [Figure("none is as good", "", float("inf"), ("<=", 0.35)), Figure(note)])
 
     def contours(self):
         bars = {"exact": {"1": 80, "10": 12, "100": 3}, "fast": {"1": 100, "10": 20, "100": 4}}
@@ -125,13 +126,13 @@ class Table:
             flat, instances = (self.get(f"contours/{scene}/{count}/{p}") for p in ("paper_flat", "paper"))
             if not flat:
                 continue
-            missed = found.counters["missed"] + found.counters["false"]
+            exact = method == "exact"
             figures = [times(flat.cpu / found.cpu, (">=", bars[method][count])),
-                       counter(found, "complete", "complete {:.5f}", (">=", 1) if method == "exact" else None),
-                       Figure(f"{missed:.0f} of {found.counters['pixels']:.0f} px differ", missed,
-                              ("<=", 0) if method == "exact" else None)]
+                       counter(found, "missed", 0, " px missed", ("<=", 0) if exact else None),
+                       counter(found, "false", 0, " px false", ("<=", 0) if exact else None),
+                       Figure(f"of {found.counters['pixels']:.0f}")]
             if instances:
-                figures.append(Figure(f"{instances.cpu / found.cpu:.3g}x of the instanced mask", None))
+                figures.append(Figure(f"{instances.cpu / found.cpu:.3g}", "x against masked instances"))
             yield Row(f"{scene}, {count} target{'s' if count != '1' else ''}, {method}", figures)
 
     def cut(self):
@@ -151,18 +152,18 @@ class Table:
             wanted, aim = bars.get(m[1], (None, None)) if m[2] == "reveal" else (None, None)
             memory = ("<=", 100) if m[1] in ("assembly10x", "cortex") else None
             yield Row(f"{m[1]}, {m[2]}, {job.counters['triangles'] / 1e3:,.0f} thousand triangles", [
-                Figure(f"{job.wall:.2f} s", job.wall, wanted, aim),
-                counter(job, "cpu_s", "{:.2f} s CPU"),
-                counter(job, "peak_MB", "{:.0f} MB"),
-                counter(job, "bytes_per_triangle", "{:.0f} bytes a triangle", memory),
+                Figure(f"{job.wall:.2f}", " s", job.wall, wanted, aim),
+                counter(job, "cpu_s", 2, " s CPU"),
+                counter(job, "peak_MB", 0, " MB"),
+                counter(job, "bytes_per_triangle", 0, " bytes a triangle", memory),
             ])
 
     def job_stages(self):
         for m in self.named(r"job/(\w+)/(\w+)"):
             counters = self.get(m[0]).counters
-            yield Row(f"{m[1]}, {m[2]}", [counter(self.get(m[0]), f"{stage}_s", f"{stage} {{:.2f}} s")
+            yield Row(f"{m[1]}, {m[2]}", [Figure(f"{stage} {counters[stage + '_s']:.2f}", " s")
                                           for stage in ("load", "build", "plan", "render", "write")
-                                          if f"{stage}_s" in counters])
+                                          if stage + "_s" in counters])
 
     def instances(self):
         one = self.get("instances/1/frame")
@@ -170,9 +171,9 @@ class Table:
                                    ("rough_frame", "one sample a pixel", None),
                                    ("direct_frame", "one sample a pixel, no ambient occlusion", None)):
             if frame := self.get(f"instances/1000/{name}"):
-                figures = [Figure(f"{frame.wall:.2f} s", frame.wall, wanted)]
+                figures = [Figure(f"{frame.wall:.2f}", " s", frame.wall, wanted)]
                 if one and name == "frame":
-                    figures.append(Figure(f"{frame.wall / one.wall:.2g}x of a single placement", None))
+                    figures.append(Figure(f"{frame.wall / one.wall:.2g}", "x a single placement"))
                 yield Row(what, figures)
 
     def threads(self):
@@ -183,7 +184,7 @@ class Table:
     def failed(self):
         for name, result in self.results.items():
             if result.error:
-                yield Row(name, [Figure(result.error, float("nan"), ("<=", 0))])
+                yield Row(name, [Figure(result.error)], True)
 
     def sections(self):
         """(title, rows) of everything that was run."""
@@ -205,26 +206,26 @@ class Table:
 def wanted_text(row):
     parts = []
     for figure in row.figures:
-        unit = re.sub(r"^[-+.,\d\s]*", "", figure.text)
-        unit = ("" if unit.startswith("x") else " ") + unit if unit else ""
-        if figure.wanted and figure.wanted[1] != 0 and figure.value != float("inf"):
-            parts.append(f"{figure.wanted[0]} {figure.wanted[1]:g}" + (unit if len(unit) < 5 else ""))
-        elif figure.wanted:
-            parts.append(f"{figure.wanted[0]} {figure.wanted[1]:g}")
+        if figure.wanted:
+            operation, bar = figure.wanted
+            parts.append(f"{operation} {bar:g}{figure.unit}" if bar else f"0{figure.unit}")
         if figure.aim:
-            parts.append(f"(aim {figure.aim:g})")
-    return ", ".join(parts).replace(", (", " (")
+            aim = f"(aim {figure.aim:g})"
+            parts[-1:] = [f"{parts[-1]} {aim}"] if figure.wanted else [aim]
+    return ", ".join(parts)
 
 
 def verdict(row):
-    """"met", "NOT met", or nothing where nothing is wanted."""
+    """What became of what is wanted; nothing where nothing is."""
+    if row.failed:
+        return "FAILED"
     judged = [COMPARE[f.wanted[0]](f.value, f.wanted[1]) for f in row.figures if f.wanted]
     return ("met" if all(judged) else "NOT met") if judged else ""
 
 
 def lines_of(sections, markdown):
     for title, rows in sections:
-        cells = [[r.what, ", ".join(f.text for f in r.figures), wanted_text(r), verdict(r)] for r in rows]
+        cells = [[r.what, ", ".join(f.number + f.unit for f in r.figures), wanted_text(r), verdict(r)] for r in rows]
         header = ["", "measured", "wanted", ""]
         if markdown:
             yield from ("", f"### {title}", "", "| " + " | ".join(header) + " |", "|---" * len(header) + "|")
@@ -242,14 +243,19 @@ def main():
     parser.add_argument("--markdown", action="store_true", help="tables for the documentation")
     arguments = parser.parse_args()
     with open(arguments.file, encoding="utf-8") as file:
-        report = json.load(file)
+        text = file.read()
+    if not text:
+        print("bench_table: no benchmark of that name was run", file=sys.stderr)
+        return 1
+    report = json.loads(text)
     sections = Table(read_results(report)).sections()
     context = report.get("context", {})
     load = ", ".join(f"{x:.1f}" for x in context.get("load_avg", []))
     print(f"{context.get('date', '?')}, {context.get('num_cpus', '?')} processors, load {load or '?'}")
     print("\n".join(lines_of(sections, arguments.markdown)))
     verdicts = [verdict(row) for _, rows in sections for row in rows]
-    print(f"\n{verdicts.count('met')} met, {verdicts.count('NOT met')} not met")
+    failed = verdicts.count("FAILED")
+    print(f"\n{verdicts.count('met')} met, {verdicts.count('NOT met')} not met" + (f", {failed} FAILED" if failed else ""))
     return 0
 
 

@@ -85,12 +85,19 @@ class BenchTable(unittest.TestCase):
         self.assertEqual(bench_table.verdict(found(1, 13)), "NOT met")
         self.assertEqual(bench_table.verdict(found(100, 13, missed=1, complete=0.99)), "NOT met")
 
+    def test_what_is_wanted_is_written_with_its_unit(self):
+        counters = {"dB": 50, "wrong_ids_%": 0, "missed": 0, "traced_%": 5}
+        row = only_row(runs("refine/spheres/1080p/1/full", [50]),
+                       runs("refine/spheres/1080p/1/adaptive", [10], **counters))
+        self.assertEqual(bench_table.wanted_text(row),
+                         ">= 4x (aim 6), >= 45 dB, <= 0.001 % wrong ids, 0 parts missed")
+
     def test_jobs_are_judged_by_wall_time(self):
         counters = {"cpu_s": 2, "peak_MB": 200, "triangles": 5e5, "bytes_per_triangle": 300, "load_s": 0.25}
         table = rows(runs("job/assembly/reveal/process_time/manual_time", [5000], [1100], **counters))
         self.assertEqual([bench_table.verdict(row) for row in table["Whole jobs, file to PNG"]], ["met"])
         (stages,) = table["Where the wall time of a job goes"]
-        self.assertEqual([figure.text for figure in stages.figures], ["load 0.25 s"])
+        self.assertEqual([figure.number + figure.unit for figure in stages.figures], ["load 0.25 s"])
 
     def test_threads_are_judged_by_wall_time(self):
         row = only_row(runs("threads/body/frame/1/process_time/real_time", [10], [10]),
@@ -102,7 +109,7 @@ class BenchTable(unittest.TestCase):
                    "error_message": "the program ended with status 256"}]
         row = only_row(failed)
         self.assertEqual(row.what, "job/assembly/reveal")
-        self.assertEqual(bench_table.verdict(row), "NOT met")
+        self.assertEqual(bench_table.verdict(row), "FAILED")
 
     def test_both_forms_hold_every_cell(self):
         sections = [("Title", [only_row(runs("primary/body/bare", [9]), runs("primary/body/ids", [10]))])]
