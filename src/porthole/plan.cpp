@@ -72,6 +72,14 @@ void add_thin_targets(const Subject& subject, const View& view, std::span<const 
     }
 }
 
+/// Each target alone, in the picture and its margin.
+std::vector<TargetView> view_each_target(const Subject& subject, const View& view, Rect whole, const Control& control,
+                                         std::int64_t& rays) {
+    std::vector<TargetView> targets;
+    for (const PartId id : subject.targets) targets.push_back(view_target(subject, view, whole, id, control, rays));
+    return targets;
+}
+
 /// For each target whether another one covers most of it.
 void find_hiding_targets(std::vector<TargetView>& targets, const IdBuffer& ids) {
     for (TargetView& target : targets) {
@@ -160,6 +168,16 @@ struct Windows {
     Rect targets;     ///< where in it targets can be, and plan.window
     Rect enclosing;   ///< where the enclosing object can matter to the hole
 };
+
+/// The widest band that the hole may have.
+HoleParams band_of(const Subject& subject, const View& view, const PlanParams& params) {
+    return {.depth_px = band_depth_px(subject, view, params), .blur_px = 0.025f * float(view.height)};
+}
+
+CutawayMargins margins_of(const View& view, const PlanParams& params, const HoleParams& band) {
+    if (params.style == HoleStyle::cutaway) return cutaway_margins(view, params, band);
+    return {hole_margin_px(band), hole_margin_px(band)};
+}
 
 /// Ids of the opened targets in windows.targets.
 IdBuffer target_ids(const Subject& subject, const Bvh& bvh, ContourMethod method, const Windows& windows,
@@ -301,24 +319,28 @@ int band_depth_px(const Subject& subject, const View& view, const PlanParams& pa
     return std::max(1, int(std::lround(px)));
 }
 
+std::vector<TargetView> view_targets(const Subject& subject, const View& view, const PlanParams& params,
+                                     const Control& control) {
+    const Rect whole = view.window().grown(margins_of(view, params, band_of(subject, view, params)).hole);
+    std::int64_t ignored = 0;
+    return view_each_target(subject, view, whole, control, ignored);
+}
+
 ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params, const Control& control) {
     const Scene& scene = subject.scene();
     ViewPlan plan;
     plan.view = view;
     plan.ghost = params.style == HoleStyle::ghost;
-    plan.depth_px = band_depth_px(subject, view, params);
-    const HoleParams band{.depth_px = plan.depth_px, .blur_px = 0.025f * float(view.height)};
-    const CutawayMargins margins = params.style == HoleStyle::cutaway
-                                       ? cutaway_margins(view, params, band)
-                                       : CutawayMargins{hole_margin_px(band), hole_margin_px(band)};
+    const HoleParams band = band_of(subject, view, params);
+    plan.depth_px = band.depth_px;
+    const CutawayMargins margins = margins_of(view, params, band);
     Windows windows;
     windows.whole = plan.whole = view.window().grown(margins.hole);
     windows.all_targets = view.window().grown(margins.targets);
 
     // Each target alone, then all of them together.
     const BlockMask blocks = mark_blocks(scene, subject.targets, subject.boxes, view, windows.all_targets);
-    for (const PartId id : subject.targets)
-        plan.targets.push_back(view_target(subject, view, windows.whole, id, control, plan.rays.alone));
+    plan.targets = view_each_target(subject, view, windows.whole, control, plan.rays.alone);
     for (const TargetView& target : plan.targets)
         if (!target.absent) plan.opened.push_back(target.part);
     const Rect touched = pixel_rect(blocks, windows.all_targets);

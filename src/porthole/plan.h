@@ -132,6 +132,12 @@ struct ViewPlan {
     [[nodiscard]] bool nothing_to_cut() const { return cut.empty(); }
 };
 
+/// Where each target alone would be seen: ViewPlan::targets before any is refused.
+/// @throws Error usage E0120 (depth out of range); Cancelled.
+/// Cost: rays where the targets' boxes are.
+[[nodiscard]] std::vector<TargetView> view_targets(const Subject& subject, const View& view,
+                                                   const PlanParams& params = {}, const Control& control = {});
+
 /// Plans the hole of one view. The same bits for any number of threads.
 /// @throws Error usage E0120 (depth, bevel or angle out of range); Cancelled.
 /// Cost: rays at the targets' pixels and around them, not a full frame; see ViewPlan::rays.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numeric>
+#include <span>
 
 #include "porthole/hole/metrics.h"
 
@@ -47,6 +49,126 @@ IdBuffer opened_ids(const ViewPlan& plan, const IdBuffer& before) {
             }
         }
     return after;
+}
+
+/// Candidates looked at in one size.
+struct Round {
+    const Subject& subject;
+    const FrameSubject& frame;
+    const CameraParams& camera;
+    int width = 1, height = 1;
+    PlanParams params;
+
+    /// @param width, height  of the picture wanted, pixels
+    Round(const Subject& of, const FrameSubject& framing, const CameraParams& by, int full_width, int full_height,
+          int width_px, const PlanParams& wanted, HoleStyle style)
+        : subject(of), frame(framing), camera(by), params(wanted) {
+        const double scale = std::min(1.0, double(width_px) / full_width);
+        width = std::max(1, int(std::lround(full_width * scale)));
+        height = std::max(1, int(std::lround(full_height * scale)));
+        params.style = style;
+        if (params.depth && params.depth->unit == Length::Unit::pixel)
+            params.depth->value = std::max(1.0, params.depth->value * scale);
+        if (params.bevel && params.bevel->unit == Length::Unit::pixel) params.bevel->value *= scale;
+    }
+    [[nodiscard]] View view(Vec3f toward_eye) const {
+        return view_from_direction(frame, toward_eye, camera, width, height);
+    }
+};
+
+/// How good a candidate can be at best, by the targets alone.
+ViewScore best_score(const Round& round, const View& view, const Control& control) {
+    ViewScore score;
+    score.visible = 1;
+    score.pose = pose_of(-view.forward());
+    score.entropy = 1 + 1e-9; // what rounding can make of it
+    for (const TargetView& target : view_targets(round.subject, view, round.params, control)) {
+        score.refused |= target.absent;
+        score.target_pixels += target.pixels_alone;
+    }
+    return score;
+}
+
+/// What a candidate is worth: those that refuse a target come last, ties by lowest index.
+struct Rank {
+    bool refused = true;
+    double value = 0;
+    std::size_t candidate = 0;
+    [[nodiscard]] bool before(const Rank& other) const {
+        if (refused != other.refused) return other.refused;
+        return value != other.value ? value > other.value : candidate < other.candidate;
+    }
+};
+
+/// The best of several threads' candidates.
+class Leaders {
+public:
+    explicit Leaders(std::size_t most) : most_(most) {}
+    /// Whether a candidate that is at best worth `rank` may still come among them.
+    [[nodiscard]] bool may_join(const Rank& rank) const {
+        const std::lock_guard lock(mutex_);
+        return ranks_.size() < most_ || rank.before(ranks_.back());
+    }
+    void join(const Rank& rank) {
+        const std::lock_guard lock(mutex_);
+        const auto before = [](const Rank& a, const Rank& b) { return a.before(b); };
+        ranks_.insert(std::upper_bound(ranks_.begin(), ranks_.end(), rank, before), rank);
+        if (ranks_.size() > most_) ranks_.pop_back();
+    }
+    [[nodiscard]] std::vector<std::size_t> candidates() const {
+        std::vector<std::size_t> out;
+        for (const Rank& rank : ranks_) out.push_back(rank.candidate);
+        return out;
+    }
+
+private:
+    std::size_t most_;
+    std::vector<Rank> ranks_; ///< best first
+    mutable std::mutex mutex_;
+};
+
+/// The best `most` of the candidates, best first. A candidate is weighed only as far as it takes to
+/// know that others are better, the most promising ones first; which ones are left out depends on
+/// the threads, what comes back does not.
+std::vector<std::size_t> best_of(const Round& round, std::span<const Vec3f> directions,
+                                 std::span<const std::size_t> candidates, std::size_t most, const Control& control) {
+    struct Candidate {
+        std::size_t index = 0;
+        View view;
+        ViewScore best;
+    };
+    const Control one{control.stop, {}, 1};
+    std::vector<Candidate> rated(candidates.size());
+    parallel_for(rated.size(), control, [&](std::size_t i) {
+        const View view = round.view(directions[candidates[i]]);
+        rated[i] = {candidates[i], view, best_score(round, view, one)};
+    });
+    std::int64_t largest = 0;
+    for (const Candidate& c : rated) largest = std::max(largest, c.best.target_pixels);
+    const auto rank = [&](const Candidate& c, const ViewScore& score) {
+        return Rank{score.refused, score.value(largest), c.index};
+    };
+    std::sort(rated.begin(), rated.end(),
+              [&](const Candidate& a, const Candidate& b) { return rank(a, a.best).before(rank(b, b.best)); });
+
+    Leaders leaders(most);
+    const Subject& subject = round.subject;
+    const auto weigh = [&](Candidate& c, const Control& by) {
+        if (!leaders.may_join(rank(c, c.best))) return;
+        const IdBuffer ids = trace_ids(subject.whole, c.view, c.view.window(), by);
+        c.best.entropy = entropy(ids, subject.scene().parts.size());
+        if (!leaders.may_join(rank(c, c.best))) return;
+        const ViewPlan plan = plan_view(subject, c.view, round.params, by);
+        leaders.join(rank(c, score_view(subject, plan, ids)));
+    };
+    // Side by side, one thread each; of the last ones, too few for that, several threads each.
+    const auto threads = std::size_t(thread_count(control));
+    const std::size_t last = rated.size() % threads, first = rated.size() - last;
+    parallel_for(first, control, [&](std::size_t i) { weigh(rated[i], one); });
+    if (last == 0) return leaders.candidates();
+    const Control several{control.stop, {}, int(threads / last)};
+    parallel_for(last, {control.stop, {}, int(last)}, [&](std::size_t i) { weigh(rated[first + i], several); });
+    return leaders.candidates();
 }
 
 } // namespace
@@ -107,47 +229,15 @@ ViewScore score_view(const Subject& subject, const ViewPlan& plan, const IdBuffe
 Vec3f best_direction(const Subject& subject, const FrameSubject& frame, const CameraParams& camera, int width,
                      int height, const PlanParams& params, const Control& control) {
     const std::vector<Vec3f> directions = candidate_directions();
-
-    // Scores of some candidates at a given width, side by side; each is planned by one thread.
-    const auto scores_at = [&](const std::vector<std::size_t>& candidates, int width_px, HoleStyle style) {
-        const double scale = std::min(1.0, double(width_px) / width);
-        const int w = std::max(1, int(std::lround(width * scale))), h = std::max(1, int(std::lround(height * scale)));
-        PlanParams small = params;
-        small.style = style;
-        if (small.depth && small.depth->unit == Length::Unit::pixel)
-            small.depth->value = std::max(1.0, small.depth->value * scale);
-        if (small.bevel && small.bevel->unit == Length::Unit::pixel) small.bevel->value *= scale;
-        std::vector<ViewScore> scores(candidates.size());
-        parallel_for(candidates.size(), control, [&](std::size_t i) {
-            const Control one{control.stop, {}, 1};
-            const View view = view_from_direction(frame, directions[candidates[i]], camera, w, h);
-            scores[i] = score_view(subject, plan_view(subject, view, small, one),
-                                   trace_ids(subject.whole, view, view.window(), one));
-        });
-        return scores;
+    const auto round_at = [&](int width_px, HoleStyle style) {
+        return Round(subject, frame, camera, width, height, width_px, params, style);
     };
-    // Candidates from best to worst.
-    const auto ranked = [&](const std::vector<std::size_t>& candidates, const std::vector<ViewScore>& scores) {
-        std::int64_t largest = 0;
-        for (const ViewScore& s : scores) largest = std::max(largest, s.target_pixels);
-        std::vector<std::size_t> order(candidates.size());
-        std::iota(order.begin(), order.end(), std::size_t{0});
-        std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-            if (scores[a].refused != scores[b].refused) return scores[b].refused;
-            const double va = scores[a].value(largest), vb = scores[b].value(largest);
-            return va != vb ? va > vb : candidates[a] < candidates[b];
-        });
-        for (std::size_t& i : order) i = candidates[i];
-        return order;
-    };
-
     std::vector<std::size_t> all(directions.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
     // Straight walls are cheaper to plan and lead to the same few.
     const HoleStyle rough = params.style == HoleStyle::cutaway ? HoleStyle::hole : params.style;
-    std::vector<std::size_t> best = ranked(all, scores_at(all, 256, rough));
-    best.resize(std::min<std::size_t>(best.size(), 5));
-    return directions[ranked(best, scores_at(best, 512, params.style)).front()];
+    const std::vector<std::size_t> best = best_of(round_at(256, rough), directions, all, 5, control);
+    return directions[best_of(round_at(512, params.style), directions, best, 1, control).front()];
 }
 
 } // namespace porthole

@@ -15,6 +15,8 @@
 #include "porthole/reveal.h"
 #include "porthole/scene/camera.h"
 #include "porthole/scene/select.h"
+#include "porthole/viewpoint.h"
+#include "support/direction.h"
 #include "support/shapes.h"
 #include "support/shared.h"
 
@@ -276,6 +278,21 @@ TEST_P(Models, SamePictureForAnyThreadsOrderOfPartsAndDuplicates) {
     std::mt19937 random(5);
     std::shuffle(shuffled.parts.begin(), shuffled.parts.end(), random);
     EXPECT_EQ(first, picture(shuffled, 2)) << "parts in another order";
+}
+
+TEST_P(Models, AutomaticCameraIsThatOfWeighingEveryCandidate) {
+    PORTHOLE_NEEDS_SHARED(shared);
+    const Scene scene = load_scene(shared / "models" / GetParam().file);
+    const MeshBvhs meshes = build_mesh_bvhs(scene);
+    const std::vector<std::string>& selectors = GetParam().targets;
+    for (const std::size_t n : {std::size_t{1}, selectors.size()}) {
+        const std::vector<PartId> targets = select_parts(scene, std::span(selectors).first(n));
+        const Subject subject = make_subject(meshes, targets);
+        const FrameSubject frame = frame_subject(scene, targets);
+        EXPECT_EQ(best_direction(subject, frame, {}, 1280, 720, {}),
+                  test::weighed_direction(subject, frame, {}, 1280, 720, {}))
+            << n << " selectors";
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Real, Models, testing::ValuesIn(kModels), [](const auto& param) {
