@@ -65,6 +65,16 @@ std::vector<std::uint8_t> rest_of(const Scene& scene, const RevealParams& params
     return rest;
 }
 
+/// The ids that were inferred of a picture, from those of another that shows the same there.
+void take_inferred_ids(Frame& frame, const IdBuffer& ids) {
+    for (std::size_t i = 0; i < frame.inferred.pixels().size(); ++i) {
+        if (!frame.inferred.pixels()[i]) continue;
+        frame.ids.id.pixels()[i] = ids.id.pixels()[i];
+        frame.ids.depth.pixels()[i] = ids.depth.pixels()[i];
+    }
+    frame.inferred = {};
+}
+
 struct Pictures {
     Frame plain; ///< around the hole; empty if the plan is a ghost
     Frame frame;
@@ -173,6 +183,8 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
             auto [around_hole, frame] = draw(plan, around, inside, targets, caps, by, control);
             const Drawn drawn{cut ? inside : around, &targets, cut ? &plan.cut : nullptr,
                               cut ? &caps : nullptr, view,     by};
+            if (params.rest != Rest::keep || !shell.empty())
+                measuring_rays += trace_inferred_ids(around, view, frame, view.window(), control);
             restyle(frame, drawn, rest, params.rest, control);
             if (!shell.empty()) lay_shell(frame, drawn, build_bvh(meshes, shell), control);
             RayCounts rays = frame.rays;
@@ -183,8 +195,11 @@ Revealed reveal(const MeshBvhs& meshes, const RevealParams& params, const Contro
         };
         revealed.frame = draw_compared(scene, look, params.compare_full, draw_by, refinement);
         revealed.inferred = revealed.frame.inferred;
-        measuring_rays = trace_inferred_ids(around, view, revealed.frame, control) +
-                         trace_inferred_ids(around, view, plain, control);
+        measuring_rays += trace_inferred_ids(around, view, plain, view.window(), control);
+        if (!shell.empty() || !cut)
+            measuring_rays += trace_inferred_ids(around, view, revealed.frame, view.window(), control);
+        else
+            take_inferred_ids(revealed.frame, plain.ids);
     }
     const double rendered = seconds_since(start) - planned;
 

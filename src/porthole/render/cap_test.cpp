@@ -116,6 +116,7 @@ struct Pocket {
 
 RenderParams params() {
     RenderParams p;
+    p.refine = Refine::full;
     p.samples = 1;
     p.ao_samples = 8;
     p.emphasis = Emphasis::none;

@@ -158,11 +158,13 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
     Rect window = cut.empty() ? Rect{} : hole_window(cut, view);
     if (window.empty()) return frame;
     if (is_selective(params.refine)) window = whole_macro_pixels(window, params.refine_by, view);
+    // Lines are drawn where the hole shows another surface than was there.
+    const std::int64_t before = trace_inferred_ids(bvh, view, frame, window, control);
     const Camera camera(bvh, targets, view, &cut, caps);
     Picture picture(view, params, camera, window);
     mark_hole(picture, cut);
     if (is_selective(params.refine)) mark_known(picture, &cut, nullptr, true);
-    draw(picture, bvh, targets, &cut, &under.ids, control);
+    draw(picture, bvh, targets, &cut, &frame.ids, control);
     // Only pixels with a sample in the hole change; the others stay the plain picture's.
     for (int y = window.y0; y < window.y1; ++y)
         for (int x = window.x0; x < window.x1; ++x) {
@@ -178,6 +180,7 @@ Frame draw_hole(const Bvh& bvh, const Bvh* targets, const View& view, const Rend
                                                                : std::uint8_t{0};
         }
     frame.rays = picture.rays.get();
+    frame.rays.primary += before;
     return frame;
 }
 

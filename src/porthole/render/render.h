@@ -65,7 +65,7 @@ struct RenderParams {
     int ao_samples = 4;   ///< ambient occlusion rays per pixel, [0, 256]; sixteen neighbours share theirs
     bool shadows = true;
     int max_bounces = 6; ///< reflections, refractions and blended surfaces along one path, [0, 64]
-    Refine refine = Refine::full;
+    Refine refine = Refine::adaptive;
     RefineParams refine_by;
     Shading shading = Shading::raytraced; ///< flat: colour times facing, no secondary rays (the paper's "full mode")
     Emphasis emphasis = Emphasis::accent; ///< of the targets, seen through the hole
@@ -135,11 +135,12 @@ struct Frame {
 [[nodiscard]] Frame render_around(const Bvh& bvh, const View& view, const RenderParams& params, const Cut& cut,
                                   const Control& control = {});
 
-/// Traces the ids of `frame` that were inferred, so that what is measured was traced; none are
-/// inferred then.
+/// Traces the ids of `frame` in `window` that were inferred, so that what is measured was traced;
+/// none are inferred then.
 /// @param bvh  what `frame` shows outside its hole: nothing is inferred inside.
 /// @return rays traced. @throws Cancelled. Cost: one coherent ray a pixel of the 4x4 blocks with
 ///         inferred ones.
-std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, const Control& control = {});
+std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, Rect window,
+                                const Control& control = {});
 
 } // namespace porthole

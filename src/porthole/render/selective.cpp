@@ -219,9 +219,10 @@ void draw_selectively(Picture& picture, const Stage& stage, const Control& contr
     if (any_inferred) picture.inferred = std::move(inferred);
 }
 
-std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, const Control& control) {
+std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, Rect window, const Control& control) {
     if (frame.inferred.empty()) return 0;
-    const Rect w = frame.inferred.window();
+    const Rect w = frame.inferred.window().intersected(window);
+    if (w.empty()) return 0;
     const auto block = [](int v) { return v >> 2; };
     BlockMask blocks{{block(w.x0), block(w.y0), block(w.x1 - 1) + 1, block(w.y1 - 1) + 1}, {}};
     blocks.marked = Mask(blocks.blocks, 0);
@@ -234,8 +235,9 @@ std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, 
             if (!frame.inferred(x, y)) continue;
             frame.ids.id(x, y) = ids.id(x, y);
             frame.ids.depth(x, y) = ids.depth(x, y);
+            frame.inferred(x, y) = 0;
         }
-    frame.inferred = {};
+    if (w == frame.inferred.window()) frame.inferred = {};
     return rays;
 }
 

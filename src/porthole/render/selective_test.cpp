@@ -235,10 +235,10 @@ TEST_P(Selective, IsThePlainPictureOutsideTheHole) {
 TEST_P(Selective, InferredIdsCanBeTraced) {
     Frame frame = plain(by_);
     const IdBuffer right = trace_ids(bvh_, view_, view_.window());
-    EXPECT_GT(trace_inferred_ids(bvh_, view_, frame), 0);
+    EXPECT_GT(trace_inferred_ids(bvh_, view_, frame, view_.window()), 0);
     EXPECT_EQ(frame.ids, right);
     EXPECT_TRUE(frame.inferred.empty());
-    EXPECT_EQ(trace_inferred_ids(bvh_, view_, frame), 0);
+    EXPECT_EQ(trace_inferred_ids(bvh_, view_, frame, view_.window()), 0);
 }
 
 TEST_P(Selective, RefusesParametersOutOfRange) {
