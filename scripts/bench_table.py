@@ -168,7 +168,7 @@ class Table:
     def instances(self):
         one = self.get("instances/1/frame")
         for name, what, wanted in (("frame", "a frame as the command line draws it", ("<=", 1.5)),
-                                   ("rough_frame", "one sample a pixel", None),
+                                   ("rough_frame", "one sample a pixel", ("<=", 1.5)),
                                    ("direct_frame", "one sample a pixel, no ambient occlusion", None)):
             if frame := self.get(f"instances/1000/{name}"):
                 figures = [Figure(f"{frame.wall:.2f}", " s", frame.wall, wanted)]
