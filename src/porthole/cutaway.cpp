@@ -143,7 +143,7 @@ CutawayMargins cutaway_margins(const View& view, const PlanParams& params, const
 }
 
 void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect around,
-                  const IdBuffer& ids, ViewPlan& plan, const Control& control) {
+                  const IdBuffer& ids, const IdBuffer* plain, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const float tolerance = subject.tolerance();
     RimParams rim = rim_params(subject, view, params);
@@ -171,7 +171,7 @@ void plan_cutaway(const Subject& subject, const PlanParams& params, const HolePa
           trace_spans(subject.whole, kMaskCutSet, view, beside, tolerance, control, &plan.rays.spans).parts);
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
     plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, around, plan.whole, control,
-                                      plan.rays.enclosing);
+                                      plan.rays.enclosing, plain);
 
     keep_clear(core, plan.target_ids.id, plan.enclosing, plan.depth_px);
     for (std::size_t i = 0; i < core.pixels().size(); ++i)

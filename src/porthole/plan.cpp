@@ -196,7 +196,7 @@ IdBuffer target_ids(const Subject& subject, const Bvh& bvh, ContourMethod method
 
 /// Everything of the plan that depends on which targets are opened.
 void plan_opened_group(const Subject& subject, const PlanParams& params, const HoleParams& band, const Windows& windows,
-                       const BlockMask& blocks, ViewPlan& plan, const Control& control) {
+                       const BlockMask& blocks, const IdBuffer* plain, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const bool all = plan.opened.size() == subject.targets.size();
     std::optional<Bvh> some;
@@ -216,7 +216,7 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
         plan.contours = find_contours(plan.target_ids.id);
     find_hiding_targets(plan.targets, plan.target_ids);
     if (params.style == HoleStyle::cutaway)
-        return plan_cutaway(subject, params, band, windows.enclosing, ids, plan, control);
+        return plan_cutaway(subject, params, band, windows.enclosing, ids, plain, plan, control);
 
     // What lies in front of the targets is cut; the rest is loose.
     plan.spans =
@@ -225,7 +225,7 @@ void plan_opened_group(const Subject& subject, const PlanParams& params, const H
     if (plan.cut_set.empty()) return;
     const Bvh cut_bvh = build_bvh(*subject.meshes, plan.cut_set);
     plan.enclosing = enclosing_object(subject.scene(), plan.cut_set, cut_bvh, view, windows.enclosing, windows.whole,
-                                      control, plan.rays.enclosing);
+                                      control, plan.rays.enclosing, plain);
 
     Mask covered(plan.window, 0);
     for (std::size_t i = 0; i < covered.pixels().size(); ++i)
@@ -254,10 +254,26 @@ std::vector<PartId> no_room(const ViewPlan& plan, const PlanParams& params) {
     return refused;
 }
 
+/// Calls body(block, its pixels) for the marked 4x4 blocks in `window` of which every pixel shows one of the parts.
+template <typename Body> void for_each_known_block(const BlockMask& blocks, Rect window, const Image<PartId>& ids,
+                                                   const std::vector<std::uint8_t>& is_part, Body&& body) {
+    const Rect inside{(window.x0 + 3) >> 2, (window.y0 + 3) >> 2, window.x1 >> 2, window.y1 >> 2};
+    const Rect b = inside.intersected(blocks.blocks);
+    for (int by = b.y0; by < b.y1; ++by)
+        for (int bx = b.x0; bx < b.x1; ++bx) {
+            bool known = blocks.marked(bx, by) != 0;
+            for (int i = 0; i < 16 && known; ++i) {
+                const PartId id = ids(4 * bx + i % 4, 4 * by + i / 4);
+                known = id != kNoPart && is_part[index(id)];
+            }
+            if (known) body(Vec2i{bx, by}, Rect{4 * bx, 4 * by, 4 * bx + 4, 4 * by + 4});
+        }
+}
+
 } // namespace
 
 Mask enclosing_object(const Scene& scene, std::span<const PartId> parts, const Bvh& cut_set, const View& view,
-                      Rect window, Rect whole, const Control& control, std::int64_t& rays) {
+                      Rect window, Rect whole, const Control& control, std::int64_t& rays, const IdBuffer* plain) {
     // One box a part: what none of them touches is background without a ray.
     ClusterBoxes boxes;
     boxes.by_mesh.resize(scene.meshes.size());
@@ -266,7 +282,21 @@ Mask enclosing_object(const Scene& scene, std::span<const PartId> parts, const B
         boxes.by_mesh[mesh] = {scene.meshes[mesh].bounds};
     }
     const BlockMask blocks = mark_blocks(scene, parts, boxes, view, whole);
-    const Mask hit = trace_coverage(cut_set, view, window, &blocks, control, &rays);
+    // Where one of the parts is what one sees, it needs no ray either.
+    BlockMask unknown = blocks;
+    std::vector<Rect> known;
+    if (plain) {
+        std::vector<std::uint8_t> is_part(scene.parts.size(), 0);
+        for (const PartId id : parts) is_part[index(id)] = 1;
+        for_each_known_block(blocks, window.intersected(plain->window()), plain->id, is_part,
+                             [&](Vec2i block, Rect pixels) {
+                                 unknown.marked(block.x, block.y) = 0;
+                                 known.push_back(pixels);
+                             });
+    }
+    Mask hit = trace_coverage(cut_set, view, window, &unknown, control, &rays);
+    for (const Rect& pixels : known)
+        for (int y = pixels.y0; y < pixels.y1; ++y) std::fill_n(&hit(pixels.x0, y), pixels.width(), std::uint8_t{1});
 
     std::unordered_map<std::uint64_t, Mask> traced; // by block
     const auto hit_beyond = [&](Vec2i p) {
@@ -326,7 +356,8 @@ std::vector<TargetView> view_targets(const Subject& subject, const View& view, c
     return view_each_target(subject, view, whole, control, ignored);
 }
 
-ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params, const Control& control) {
+ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params, const Control& control,
+                   const IdBuffer* plain) {
     const Scene& scene = subject.scene();
     ViewPlan plan;
     plan.view = view;
@@ -356,14 +387,14 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     // A target that has no room is taken out of the group, and the rest is planned again:
     // what it covered may have become visible, what only it needed stays whole.
     for (;;) {
-        plan_opened_group(subject, params, band, windows, blocks, plan, control);
+        plan_opened_group(subject, params, band, windows, blocks, plain, plan, control);
         if (params.tight == Tight::open || plan.ghost || plan.cut_set.empty()) return plan;
         std::vector<PartId> refused = no_room(plan, params);
         if (refused.empty()) return plan;
         if (params.tight == Tight::ghost) {
             PlanParams ghost = params;
             ghost.style = HoleStyle::ghost;
-            return plan_view(subject, view, ghost, control);
+            return plan_view(subject, view, ghost, control, plain);
         }
         for (TargetView& target : plan.targets)
             if (std::find(refused.begin(), refused.end(), target.part) != refused.end()) {

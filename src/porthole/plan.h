@@ -142,8 +142,9 @@ struct ViewPlan {
 /// @throws Error usage E0120 (depth, bevel or angle out of range); Cancelled.
 /// Cost: rays at the targets' pixels and around them, not a full frame; see ViewPlan::rays.
 /// Safe to call concurrently on one subject.
+/// @param plain  ids of all parts in the picture, if they are known: spares rays, changes nothing else.
 [[nodiscard]] ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& params = {},
-                                 const Control& control = {});
+                                 const Control& control = {}, const IdBuffer* plain = nullptr);
 
 /// The targets' contours by themselves, as a picture in motion wants them.
 struct TargetContours {

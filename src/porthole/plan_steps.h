@@ -23,11 +23,12 @@ inline IdBuffer cropped(const IdBuffer& ids, Rect window) {
 
 /// E on `window`, a part of `whole`, the picture and its margin.
 /// @param cut_set  hierarchy of `parts`.
+/// @param plain    ids of all parts in the picture; may be null.
 /// Cost: one occlusion ray a pixel of `window` that the parts' boxes touch, and beyond it those that lie
 /// on the way of the background to the edge of `whole`.
 [[nodiscard]] Mask enclosing_object(const Scene& scene, std::span<const PartId> parts, const Bvh& cut_set,
                                     const View& view, Rect window, Rect whole, const Control& control,
-                                    std::int64_t& rays);
+                                    std::int64_t& rays, const IdBuffer* plain);
 
 /// Width in pixels of a length that users give. Not below 0.
 [[nodiscard]] double length_px(const Subject& subject, const View& view, Length length);
@@ -57,8 +58,9 @@ struct CutawayMargins {
 ///               plan.target_ids, contours and spans are made.
 /// @param most   with the widest band; around targets that are thin lines it is 3 % of the picture's
 ///               height, unless the user asked for a width.
+/// @param plain  ids of all parts in the picture; may be null.
 /// @param around where the enclosing object can matter; a part of plan.whole.
 void plan_cutaway(const Subject& subject, const PlanParams& params, const HoleParams& most, Rect around,
-                  const IdBuffer& ids, ViewPlan& plan, const Control& control);
+                  const IdBuffer& ids, const IdBuffer* plain, ViewPlan& plan, const Control& control);
 
 } // namespace porthole

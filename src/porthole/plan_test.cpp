@@ -227,6 +227,10 @@ TEST(Plan, ExactEqualsFullAndThreadsDoNotMatter) {
         const ViewPlan full = plan_view(subject, view, {.contours = ContourMethod::full}, test::with_threads(2));
         EXPECT_TRUE(same(exact, full)) << "direction " << k;
         EXPECT_LT(exact.rays.targets, full.rays.targets);
+        const IdBuffer ids = trace_ids(subject.whole, view, view.window());
+        const ViewPlan helped = plan_view(subject, view, {}, {}, &ids);
+        EXPECT_TRUE(same(exact, helped) && exact.enclosing == helped.enclosing) << "direction " << k;
+        EXPECT_LT(helped.rays.enclosing, exact.rays.enclosing);
     }
 }
 

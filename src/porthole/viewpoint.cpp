@@ -158,7 +158,7 @@ std::vector<std::size_t> best_of(const Round& round, std::span<const Vec3f> dire
         const IdBuffer ids = trace_ids(subject.whole, c.view, c.view.window(), by);
         c.best.entropy = entropy(ids, subject.scene().parts.size());
         if (!leaders.may_join(rank(c, c.best))) return;
-        const ViewPlan plan = plan_view(subject, c.view, round.params, by);
+        const ViewPlan plan = plan_view(subject, c.view, round.params, by, &ids);
         leaders.join(rank(c, score_view(subject, plan, ids)));
     };
     // Side by side, one thread each; of the last ones, too few for that, several threads each.
