@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "porthole/base/tile_loop.h"
+#include "porthole/render/preview.h"
+
 namespace porthole {
 
 namespace {
@@ -48,33 +51,39 @@ float middle_error(float a, float b, int ab, float c, float d, int cd, int gap) 
     return 0.25f * float(gap) * std::max(std::abs(before - slope), std::abs(after - slope));
 }
 
-/// One picture being refined.
+/// Blocks, each once, those of a tile together.
+std::vector<Vec2i> in_order(std::vector<Vec2i> blocks) {
+    constexpr int kTileBlocks = FilteredTile::kSize / kCell;
+    const auto key = [](Vec2i b) { return std::array<int, 4>{b.y / kTileBlocks, b.x / kTileBlocks, b.y, b.x}; };
+    std::sort(blocks.begin(), blocks.end(), [&](Vec2i a, Vec2i b) { return key(a) < key(b); });
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+    return blocks;
+}
+
+/// One picture being refined. A loop that is stopped goes on when run again: items it has done
+/// either show that or are the same when done again.
 class Refinement {
 public:
-    Refinement(Picture& picture, const Stage& stage, bool everything, const Control& control)
-        : picture_(picture), stage_(stage), everything_(everything), control_(control), map_(picture) {
+    Refinement(Picture& picture, const Stage& stage, bool everything)
+        : picture_(picture), stage_(stage), everything_(everything), map_(picture), lone_(lone_blocks(picture, map_)) {
         for (const Material& m : stage.scene.materials) plain_.push_back(is_plain(m));
     }
 
-    BlockMap run() {
-        for (int level = 0; level < LatticeAxis::kLevels; ++level) {
-            trace_level(level);
-            decide_cells(level);
-        }
-        settle_cells();
-        trace_differing();
-        trace_blocks(seeds());
-        for (std::vector<Vec2i> fresh = traced_blocks(); !fresh.empty();) fresh = trace_blocks(contradicted_by(fresh));
-        take_light();
-        settle();
-        return std::move(map_);
-    }
+    /// Goes on up to what a preview needs: the lattice of kPreviewLevel.
+    void run_to_preview(const Control& control) { run(3 * kPreviewLevel + 2, control); }
+    void run_to_end(const Control& control) { run(kSteps, control); }
+    [[nodiscard]] const BlockMap& map() const { return map_; }
 
 private:
+    void run(int end, const Control& control);
+    void take_step();
     void trace(std::span<const Vec2i> blocks, bool corners);
     void summarise(int bx, int by, bool corners);
     void color_corners(int bx, int by);
+    void assume_level(int level);
     void trace_level(int level);
+    [[nodiscard]] bool is_lone(int level, int bx, int by) const;
+    [[nodiscard]] bool is_open(int level, int bx, int by) const;
     void trace_differing();
     void assume(int bx, int by, int level);
     void decide_cells(int level);
@@ -83,7 +92,8 @@ private:
     [[nodiscard]] std::vector<Vec2i> seeds() const;
     [[nodiscard]] std::vector<Vec2i> seeds_of(PartId part) const;
     void settle_cells();
-    std::vector<Vec2i> trace_blocks(std::vector<Vec2i> blocks);
+    void trace_blocks(std::span<const Vec2i> blocks);
+    void follow();
     [[nodiscard]] std::vector<Vec2i> traced_blocks() const;
     [[nodiscard]] std::vector<Vec2i> contradicted_by(std::span<const Vec2i> fresh) const;
     [[nodiscard]] bool contradicts(Vec2i traced, Vec2i b) const;
@@ -95,10 +105,38 @@ private:
     Picture& picture_;
     const Stage& stage_;
     bool everything_;
-    const Control& control_;
+    Control control_;
     BlockMap map_;
+    Mask lone_;                       ///< lone_blocks()
     std::vector<std::uint8_t> plain_; ///< by material
+    static constexpr int kSteps = 3 * LatticeAxis::kLevels + 8;
+    int next_ = 0;             ///< step
+    std::vector<Vec2i> front_; ///< from where it is followed on
+    TileLoop loop_;
 };
+
+void Refinement::run(int end, const Control& control) {
+    control_ = control;
+    for (; next_ < end; ++next_) take_step();
+    control_ = {};
+}
+
+void Refinement::take_step() {
+    if (const int level = next_ / 3; level < LatticeAxis::kLevels) {
+        if (next_ % 3 == 0) return assume_level(level);
+        return next_ % 3 == 1 ? trace_level(level) : decide_cells(level);
+    }
+    switch (next_ - 3 * LatticeAxis::kLevels) {
+    case 0: return settle_cells();
+    case 1: return trace_differing();
+    case 2: front_ = seeds(); return;
+    case 3: return trace_blocks(front_);
+    case 4: front_ = traced_blocks(); return;
+    case 5: return follow();
+    case 6: return take_light();
+    default: return settle();
+    }
+}
 
 void Refinement::trace(std::span<const Vec2i> blocks, bool corners) {
     if (blocks.empty()) return;
@@ -184,20 +222,37 @@ template <typename Body> void for_blocks(Rect tile, Body&& body) {
         for (int bx = blocks.x0; bx < blocks.x1; ++bx) body(bx, by);
 }
 
+/// Blocks between two of the coarser lattice that agree join this one without being traced.
+void Refinement::assume_level(int level) {
+    if (level == 0) return;
+    // Before any is traced: of the two that agree one may have been assumed, and be traced now.
+    for_tiles(picture_, control_, [&](Rect tile) {
+        for_blocks(tile, [&](int bx, int by) {
+            if (map_.state(bx, by) != BlockMap::wanted || is_lone(level, bx, by)) return;
+            if (is_open(level, bx, by) && map_.between_two(level - 1, bx, by) == BlockMap::one_color)
+                assume(bx, by, level - 1);
+        });
+    });
+}
+
 void Refinement::trace_level(int level) {
     for_tiles(picture_, control_, [&](Rect tile) {
         std::vector<Vec2i> todo;
         for_blocks(tile, [&](int bx, int by) {
             if (map_.state(bx, by) != BlockMap::wanted) return;
-            if (!map_.columns.on_lattice(level, bx) || !map_.rows.on_lattice(level, by)) return;
-            if (level > 0) {
-                if (map_.allowed(level - 1, bx, by) != BlockMap::differs) return;
-                if (map_.between_two(level - 1, bx, by) == BlockMap::one_color) return assume(bx, by, level - 1);
-            }
-            todo.push_back({bx, by});
+            const bool assumed = level > 0 && map_.between_two(level - 1, bx, by) == BlockMap::one_color;
+            if (is_lone(level, bx, by) || (is_open(level, bx, by) && !assumed)) todo.push_back({bx, by});
         });
         trace(todo, true);
     });
+}
+
+bool Refinement::is_lone(int level, int bx, int by) const { return level == kPreviewLevel && lone_(bx, by); }
+
+/// Whether a block is of a lattice and not settled by the coarser one.
+bool Refinement::is_open(int level, int bx, int by) const {
+    return map_.columns.on_lattice(level, bx) && map_.rows.on_lattice(level, by) &&
+           (level == 0 || map_.allowed(level - 1, bx, by) == BlockMap::differs);
 }
 
 void Refinement::trace_differing() {
@@ -211,7 +266,6 @@ void Refinement::trace_differing() {
     });
 }
 
-/// A block between two of a lattice that agree joins the next lattice without being traced.
 void Refinement::assume(int bx, int by, int level) {
     map_.level(bx, by) = std::uint8_t(level);
     map_.allows(bx, by) = BlockMap::one_color;
@@ -372,20 +426,25 @@ std::vector<Vec2i> Refinement::seeds() const {
     });
     std::vector<Vec2i> all;
     for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
-    return all;
+    return in_order(std::move(all));
 }
 
-/// Traces blocks, each once. @return them.
-std::vector<Vec2i> Refinement::trace_blocks(std::vector<Vec2i> blocks) {
-    constexpr int kTileBlocks = FilteredTile::kSize / kCell;
-    const auto key = [](Vec2i b) { return std::array<int, 4>{b.y / kTileBlocks, b.x / kTileBlocks, b.y, b.x}; };
-    std::sort(blocks.begin(), blocks.end(), [&](Vec2i a, Vec2i b) { return key(a) < key(b); });
-    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+/// Each once, in an order in which neighbours lie close.
+void Refinement::trace_blocks(std::span<const Vec2i> blocks) {
     constexpr std::size_t kRun = 64;
     parallel_for((blocks.size() + kRun - 1) / kRun, control_, [&](std::size_t run) {
-        trace(std::span(blocks).subspan(run * kRun, std::min(kRun, blocks.size() - run * kRun)), false);
+        const auto part = blocks.subspan(run * kRun, std::min(kRun, blocks.size() - run * kRun));
+        // Runs are traced as a whole; only the one that traces a block writes its state.
+        if (map_.state(part[0].x, part[0].y) == BlockMap::wanted) trace(part, false);
     });
-    return blocks;
+}
+
+/// Round by round: what a block shows of another may change as those it follows from are traced.
+void Refinement::follow() {
+    while (!front_.empty()) {
+        trace_blocks(front_);
+        front_ = contradicted_by(front_);
+    }
 }
 
 std::vector<Vec2i> Refinement::traced_blocks() const {
@@ -397,7 +456,7 @@ std::vector<Vec2i> Refinement::traced_blocks() const {
     return blocks;
 }
 
-/// Neighbours of `fresh` blocks that have to be traced as well.
+/// Neighbours of `fresh` blocks, in_order(), that have to be traced as well.
 std::vector<Vec2i> Refinement::contradicted_by(std::span<const Vec2i> fresh) const {
     constexpr std::size_t kRun = 256;
     std::vector<std::vector<Vec2i>> runs((fresh.size() + kRun - 1) / kRun);
@@ -411,7 +470,7 @@ std::vector<Vec2i> Refinement::contradicted_by(std::span<const Vec2i> fresh) con
     });
     std::vector<Vec2i> all;
     for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
-    return all;
+    return in_order(std::move(all));
 }
 
 /// Whether a traced block shows that something else than what follows from the lattice goes on in
@@ -457,7 +516,7 @@ bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
 
 /// Camera rays of the blocks whose light alone is inferred; light too where it does not fit.
 void Refinement::take_light() {
-    for_tiles(picture_, control_, [&](Rect tile) {
+    loop_.run(map_.window, FilteredTile::kSize, control_, [&](Rect tile) {
         std::vector<Vec2i> todo, misfits;
         const Rect area = blocks_of(tile);
         for (int by = area.y0; by < area.y1; ++by)
@@ -624,8 +683,7 @@ bool BlockMap::is_busy(Rect tile) const {
     return false;
 }
 
-Surrounding::Surrounding(const BlockMap& map, int bx, int by) {
-    const int lattice = map.level(bx, by);
+Surrounding::Surrounding(const BlockMap& map, int lattice, int bx, int by) {
     const LatticeAxis::Place column = map.columns.place(lattice, bx), row = map.rows.place(lattice, by);
     block[0] = {column.low, row.low}, block[1] = {column.high, row.low};
     block[2] = {column.low, row.high}, block[3] = {column.high, row.high};
@@ -636,9 +694,16 @@ Surrounding::Surrounding(const BlockMap& map, int bx, int by) {
     x_step = 1.0f / float(std::max(1, right - left)), y_step = 1.0f / float(std::max(1, bottom - top));
 }
 
-BlockMap gather_adaptive(Picture& picture, const Stage& stage, bool everything, const Control& control) {
-    return Refinement(picture, stage, everything, control).run();
-}
+struct AdaptiveGather::Work {
+    Refinement refinement;
+};
+
+AdaptiveGather::AdaptiveGather(Picture& picture, const Stage& stage, bool everything)
+    : work_(new Work{Refinement(picture, stage, everything)}) {}
+AdaptiveGather::~AdaptiveGather() = default;
+void AdaptiveGather::trace_lattice(const Control& control) { work_->refinement.run_to_preview(control); }
+void AdaptiveGather::trace_rest(const Control& control) { work_->refinement.run_to_end(control); }
+const BlockMap& AdaptiveGather::map() const { return work_->refinement.map(); }
 
 void shade_blocks(Picture& picture, const Stage& stage, const BlockMap& map, Rect tile) {
     GBuffer& buffer = picture.buffer;

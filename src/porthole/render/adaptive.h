@@ -9,6 +9,8 @@
 // depend on the order of work.
 #pragma once
 
+#include <memory>
+
 #include "porthole/render/lattice.h"
 #include "porthole/render/picture.h"
 
@@ -77,7 +79,8 @@ struct Surrounding {
     int left, right, top, bottom; ///< pixels
     float x_step, y_step;
 
-    Surrounding(const BlockMap& map, int bx, int by);
+    Surrounding(const BlockMap& map, int bx, int by) : Surrounding(map, map.level(bx, by), bx, by) {}
+    Surrounding(const BlockMap& map, int lattice, int bx, int by);
     [[nodiscard]] int left_of(int x) const { return between_columns ? left : x; }
     [[nodiscard]] int right_of(int x) const { return between_columns ? right : x; }
     [[nodiscard]] int top_of(int y) const { return between_rows ? top : y; }
@@ -106,10 +109,24 @@ struct Surrounding {
 /// blocks that are not traced have Pixel::inferred; without Pixel::traced if all of them is inferred: their
 /// surface is in the ids, their light where traced pixels beside them look for it, and their
 /// colour comes with infer_colors().
-/// @param everything  false: camera rays are traced everywhere, only light is inferred.
 /// Cost: 1/16 of gathering every block where nothing differs.
-/// The same bits for any number of threads.
-[[nodiscard]] BlockMap gather_adaptive(Picture& picture, const Stage& stage, bool everything, const Control& control);
+/// The same bits for any number of threads. Keeps references. What Cancelled stopped goes on where it
+/// was when called again.
+class AdaptiveGather {
+public:
+    /// @param everything  false: camera rays are traced everywhere, only light is inferred.
+    AdaptiveGather(Picture& picture, const Stage& stage, bool everything);
+    ~AdaptiveGather();
+    /// As far as a preview needs it.
+    void trace_lattice(const Control& control);
+    /// And then the others.
+    void trace_rest(const Control& control);
+    [[nodiscard]] const BlockMap& map() const;
+
+private:
+    struct Work;
+    std::unique_ptr<Work> work_;
+};
 
 /// Pass 2 in place of shade_tile(): shades what is traced, but of blocks that stand alone on a smooth
 /// surface only the corners, between which their other pixels lie.

@@ -92,6 +92,11 @@ void RayTotals::add(const RayCounts& rays) {
     reflection_ += rays.reflection, refraction_ += rays.refraction;
 }
 
+void RayTotals::set(const RayCounts& rays) {
+    primary_ = rays.primary, shadow_ = rays.shadow, ambient_ = rays.ambient;
+    reflection_ = rays.reflection, refraction_ = rays.refraction;
+}
+
 RayCounts RayTotals::get() const { return {primary_, shadow_, ambient_, reflection_, refraction_}; }
 
 bool near_hole(const Cut& cut, int x, int y, int reach) {
@@ -200,7 +205,8 @@ void gather_blocks(Picture& picture, const Occlusion& occlusion, const std::vect
     picture.rays.add(rays);
 }
 
-void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile) {
+void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile,
+                 const Mask* but) {
     // Larger squares of blocks first to last, so that neighbours in the list are neighbours in
     // the picture.
     constexpr int kSquare = kCell * kCell;
@@ -210,7 +216,8 @@ void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector
         for (int sx = tile.x0 & ~(kSquare - 1); sx < tile.x1; sx += kSquare)
             for (int y = sy; y < sy + kSquare; y += kCell)
                 for (int x = sx; x < sx + kSquare; x += kCell)
-                    if (!Rect{x, y, x + kCell, y + kCell}.intersected(w).intersected(tile).empty())
+                    if (!Rect{x, y, x + kCell, y + kCell}.intersected(w).intersected(tile).empty() &&
+                        !(but && (*but)(x / kCell, y / kCell)))
                         blocks.push_back({x / kCell, y / kCell});
     gather_blocks(picture, occlusion, placements, blocks, true);
 }

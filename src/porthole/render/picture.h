@@ -15,6 +15,7 @@ namespace porthole {
 class RayTotals {
 public:
     void add(const RayCounts& rays);
+    void set(const RayCounts& rays);
     [[nodiscard]] RayCounts get() const;
 
 private:
@@ -65,7 +66,24 @@ std::optional<SurfacePoint> record(Picture& picture, const std::vector<Placement
 [[nodiscard]] bool near_hole(const Cut& cut, int x, int y, int reach);
 
 /// Pass 1: camera rays through the pixel centres, their shadow and ambient rays.
-void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile);
+/// @param but  1 for blocks that are traced already; null: none is.
+void gather_tile(Picture& picture, const Occlusion& occlusion, const std::vector<Placement>& placements, Rect tile,
+                 const Mask* but = nullptr);
+
+/// What Frame::inside says of a pixel.
+[[nodiscard]] inline std::uint8_t inside_of(const Pixel& pixel) {
+    return pixel.has(Pixel::cap)         ? std::uint8_t(Frame::cap)
+           : pixel.has(Pixel::open_back) ? std::uint8_t(Frame::open_back)
+                                         : std::uint8_t{0};
+}
+
+/// trace_inferred_ids() of a frame's parts.
+std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, IdBuffer& ids, Mask& inferred, Rect window,
+                                const Control& control);
+
+/// Shades a pixel's first sample, in `light`.
+void shade_first(const Picture& picture, const Stage& stage, Vec2i at, const Reach& light, std::uint32_t slot,
+                 Shader& shader);
 
 /// Filters the light of traced pixels of `tile` and shades their first samples.
 void shade_pixels(Picture& picture, const Stage& stage, Rect tile, std::span<const Vec2i> pixels);

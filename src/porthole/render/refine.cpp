@@ -153,6 +153,22 @@ Rect grainy(const GBuffer& buffer, Rect tile) {
 
 } // namespace
 
+void shade_first(const Picture& picture, const Stage& stage, Vec2i at, const Reach& light, std::uint32_t slot,
+                 Shader& shader) {
+    const GBuffer& buffer = picture.buffer;
+    const Hit hit = buffer.hit(at.x, at.y);
+    if (!hit.any()) {
+        shader.miss(slot);
+        return;
+    }
+    const Pixel& pixel = buffer.pixels(at.x, at.y);
+    const float x = float(at.x) + 0.5f, y = float(at.y) + 0.5f, depth = buffer.ids.depth(at.x, at.y);
+    const Vec3f direction = picture.view.ray(x, y).direction;
+    const SurfacePoint point = picture.camera.surface(stage.placements, hit, x, y, depth, direction);
+    shader.add(camera_path(picture.view, direction, depth, slot, pixel.has(Pixel::in_hole), cell_rank(at.x, at.y)), hit,
+               point, light, pixel.has(Pixel::on_target));
+}
+
 void shade_tile(Picture& picture, const Stage& stage, Rect tile) {
     std::vector<Vec2i> todo;
     for (int y = tile.y0; y < tile.y1; ++y)
@@ -173,19 +189,12 @@ void shade_pixels(Picture& picture, const Stage& stage, Rect tile, std::span<con
     for (std::uint32_t slot = 0; slot < todo.size(); ++slot) {
         const auto [x, y] = todo[slot];
         const Pixel& pixel = buffer.pixels(x, y);
-        const Hit hit = buffer.hit(x, y);
-        if (!hit.any()) {
-            shader.miss(slot);
-            continue;
+        Reach reach;
+        if (buffer.ids.id(x, y) != kNoPart) {
+            if (!flat) reach = pixel.has(Pixel::inferred) ? pixel.reach() : filtered.reach(x, y);
+            buffer.light(x, y) = PixelLight(reach);
         }
-        const Vec3f direction = picture.view.ray(float(x) + 0.5f, float(y) + 0.5f).direction;
-        const SurfacePoint point = picture.camera.surface(stage.placements, hit, float(x) + 0.5f, float(y) + 0.5f,
-                                                          buffer.ids.depth(x, y), direction);
-        const Reach reach = flat ? Reach{} : pixel.has(Pixel::inferred) ? pixel.reach() : filtered.reach(x, y);
-        buffer.light(x, y) = PixelLight(reach);
-        shader.add(camera_path(picture.view, direction, buffer.ids.depth(x, y), slot, pixel.has(Pixel::in_hole),
-                               cell_rank(x, y)),
-                   hit, point, reach, pixel.has(Pixel::on_target));
+        shade_first(picture, stage, {x, y}, reach, slot, shader);
     }
     shader.finish();
     for (std::uint32_t slot = 0; slot < todo.size(); ++slot) {

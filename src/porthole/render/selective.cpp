@@ -220,24 +220,29 @@ void draw_selectively(Picture& picture, const Stage& stage, const Control& contr
 }
 
 std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, Frame& frame, Rect window, const Control& control) {
-    if (frame.inferred.empty()) return 0;
-    const Rect w = frame.inferred.window().intersected(window);
+    return trace_inferred_ids(bvh, view, frame.ids, frame.inferred, window, control);
+}
+
+std::int64_t trace_inferred_ids(const Bvh& bvh, const View& view, IdBuffer& ids, Mask& inferred, Rect window,
+                                const Control& control) {
+    if (inferred.empty()) return 0;
+    const Rect w = inferred.window().intersected(window);
     if (w.empty()) return 0;
     const auto block = [](int v) { return v >> 2; };
     BlockMask blocks{{block(w.x0), block(w.y0), block(w.x1 - 1) + 1, block(w.y1 - 1) + 1}, {}};
     blocks.marked = Mask(blocks.blocks, 0);
     for (int y = w.y0; y < w.y1; ++y)
-        for (int x = w.x0; x < w.x1; ++x) blocks.marked(block(x), block(y)) |= frame.inferred(x, y);
+        for (int x = w.x0; x < w.x1; ++x) blocks.marked(block(x), block(y)) |= inferred(x, y);
     std::int64_t rays = 0;
-    const IdBuffer ids = trace_ids_in_blocks(bvh, view, w, blocks, control, &rays);
+    const IdBuffer traced = trace_ids_in_blocks(bvh, view, w, blocks, control, &rays);
     for (int y = w.y0; y < w.y1; ++y)
         for (int x = w.x0; x < w.x1; ++x) {
-            if (!frame.inferred(x, y)) continue;
-            frame.ids.id(x, y) = ids.id(x, y);
-            frame.ids.depth(x, y) = ids.depth(x, y);
-            frame.inferred(x, y) = 0;
+            if (!inferred(x, y)) continue;
+            ids.id(x, y) = traced.id(x, y);
+            ids.depth(x, y) = traced.depth(x, y);
+            inferred(x, y) = 0;
         }
-    if (w == frame.inferred.window()) frame.inferred = {};
+    if (w == inferred.window()) inferred = {};
     return rays;
 }
 
