@@ -477,7 +477,10 @@ std::vector<Vec2i> Refinement::contradicted_by(std::span<const Vec2i> fresh) con
 /// its neighbour `b`.
 bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
     const Surrounding around(map_, b.x, b.y);
-    if (std::find(std::begin(around.block), std::end(around.block), traced) != std::end(around.block)) return false;
+    // What the lattice was decided by has been compared, but not what was assumed of it.
+    const bool decided = map_.allows(traced.x, traced.y) != BlockMap::one_color;
+    if (decided && std::find(std::begin(around.block), std::end(around.block), traced) != std::end(around.block))
+        return false;
     const GBuffer& buffer = picture_.buffer;
     const Rect t = map_.pixels(traced.x, traced.y), r = map_.pixels(b.x, b.y);
     const int dx = b.x - traced.x, dy = b.y - traced.y;
@@ -572,16 +575,16 @@ void Refinement::infer_surface(int bx, int by, bool light) {
     if (id == kNoPart) return; // as the buffer is
     const bool surface = map_.allows(bx, by) == BlockMap::one_color;
     const bool parallel = picture_.view.orthographic;
+    if (surface)
+        around.mix_all(
+            r, [&](int x, int y) { return parallel ? buffer.ids.depth(x, y) : 1.0f / buffer.ids.depth(x, y); },
+            [&](int x, int y, float d) {
+                buffer.ids.id(x, y) = id;
+                buffer.ids.depth(x, y) = parallel ? d : 1.0f / d;
+            });
+    if (!light) return;
     for (int y = r.y0; y < r.y1; ++y)
         for (int x = r.x0; x < r.x1; ++x) {
-            if (surface) {
-                buffer.ids.id(x, y) = id;
-                const float d = around.mix(x, y, [&](int cx, int cy) {
-                    return parallel ? buffer.ids.depth(cx, cy) : 1.0f / buffer.ids.depth(cx, cy);
-                });
-                buffer.ids.depth(x, y) = parallel ? d : 1.0f / d;
-            }
-            if (!light) continue;
             Pixel& p = buffer.pixels(x, y);
             if (surface) infer_normal(around, x, y);
             const auto rounded = [&](auto&& value) { return std::lround(around.mix_blocks(map_, x, y, value)); };
@@ -744,9 +747,9 @@ void infer_colors(Picture& picture, const BlockMap& map, int level, Rect tile) {
             const Surrounding around(map, bx, by);
             for (int y = r.y0; y < r.y1; ++y) std::fill_n(&picture.inferred(r.x0, y), r.width(), std::uint8_t{1});
             if (map.summary(around.block[0].x, around.block[0].y).key == GBuffer::kNoKey) continue; // as it is
-            for (int y = r.y0; y < r.y1; ++y)
-                for (int x = r.x0; x < r.x1; ++x)
-                    picture.color(x, y) = around.mix(x, y, [&](int cx, int cy) { return picture.color(cx, cy); });
+            around.mix_all(
+                r, [&](int x, int y) { return picture.color(x, y); },
+                [&](int x, int y, Vec4f color) { picture.color(x, y) = color; });
         }
 }
 

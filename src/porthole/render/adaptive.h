@@ -90,18 +90,31 @@ struct Surrounding {
 
     /// Of what value(x, y) gives at the four pixels.
     template <typename Value> [[nodiscard]] auto mix(int x, int y, Value&& value) const {
-        const auto column = [&](int at) {
-            const auto a = value(at, top_of(y));
-            return a + (value(at, bottom_of(y)) - a) * ty(y);
-        };
-        const auto a = column(left_of(x));
-        return a + (column(right_of(x)) - a) * tx(x);
+        const auto a = mix_column(left_of(x), y, value);
+        return a + (mix_column(right_of(x), y, value) - a) * tx(x);
+    }
+    /// The same for every pixel of `r`, handed to store(x, y, mixed).
+    template <typename Value, typename Store> void mix_all(Rect r, Value&& value, Store&& store) const {
+        for (int y = r.y0; y < r.y1; ++y) {
+            if (!between_columns) {
+                for (int x = r.x0; x < r.x1; ++x) store(x, y, mix_column(x, y, value));
+                continue;
+            }
+            const auto a = mix_column(left, y, value), step = mix_column(right, y, value) - a;
+            for (int x = r.x0; x < r.x1; ++x) store(x, y, a + step * tx(x));
+        }
     }
     /// Of what value(summary) gives of the four blocks.
     template <typename Value> [[nodiscard]] float mix_blocks(const BlockMap& map, int x, int y, Value&& value) const {
         const auto of = [&](int i) { return float(value(map.summary(block[i].x, block[i].y))); };
         const float a = of(0) + (of(2) - of(0)) * ty(y), b = of(1) + (of(3) - of(1)) * ty(y);
         return a + (b - a) * tx(x);
+    }
+
+private:
+    template <typename Value> [[nodiscard]] auto mix_column(int x, int y, Value&& value) const {
+        const auto a = value(x, top_of(y));
+        return a + (value(x, bottom_of(y)) - a) * ty(y);
     }
 };
 
