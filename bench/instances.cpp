@@ -26,7 +26,8 @@ Scene many_balls(int across) {
     std::mt19937 random(1);
     std::uniform_real_distribution<double> u(-1, 1);
     for (int i = 0; i < across * across * across; ++i) {
-        const Vec3d place{double(i % across), double(i / across % across), double(i / across / across)};
+        const int row = i / across, layer = row / across;
+        const Vec3d place{double(i % across), double(row % across), double(layer)};
         const PartId id = b.add_sphere("ball" + std::to_string(i), place * 2.2, 1);
         const Frame3 turned(normalize(Vec3f{float(u(random)), float(u(random)), 1.5f}));
         Affine3d& m = b.scene.parts[index(id)].world_from_mesh;

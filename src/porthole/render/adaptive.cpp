@@ -96,6 +96,7 @@ private:
     void follow();
     [[nodiscard]] std::vector<Vec2i> traced_blocks() const;
     [[nodiscard]] std::vector<Vec2i> contradicted_by(std::span<const Vec2i> fresh) const;
+    void add_contradicted(Vec2i fresh, std::vector<Vec2i>& blocks) const;
     [[nodiscard]] bool contradicts(Vec2i traced, Vec2i b) const;
     void take_light();
     bool light_fits(int bx, int by);
@@ -462,15 +463,34 @@ std::vector<Vec2i> Refinement::contradicted_by(std::span<const Vec2i> fresh) con
     std::vector<std::vector<Vec2i>> runs((fresh.size() + kRun - 1) / kRun);
     parallel_for(runs.size(), control_, [&](std::size_t r) {
         for (std::size_t i = r * kRun; i < std::min(fresh.size(), (r + 1) * kRun); ++i)
-            for (const Vec2i d : {Vec2i{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-                const Vec2i b{fresh[i].x + d.x, fresh[i].y + d.y};
-                if (map_.state.at_or(b.x, b.y, BlockMap::unused) == BlockMap::wanted && contradicts(fresh[i], b))
-                    runs[r].push_back(b);
-            }
+            add_contradicted(fresh[i], runs[r]);
     });
     std::vector<Vec2i> all;
     for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
     return in_order(std::move(all));
+}
+
+void Refinement::add_contradicted(Vec2i fresh, std::vector<Vec2i>& blocks) const {
+    const auto is_wanted = [&](Vec2i b) { return map_.state.at_or(b.x, b.y, BlockMap::unused) == BlockMap::wanted; };
+    for (const Vec2i d : {Vec2i{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+        const Vec2i b{fresh.x + d.x, fresh.y + d.y};
+        if (is_wanted(b) && contradicts(fresh, b)) blocks.push_back(b);
+    }
+    if (map_.allows(fresh.x, fresh.y) != BlockMap::one_color) return;
+    // It was assumed to be like the blocks beside it, and others follow from it.
+    constexpr int kReach = 4;
+    const BlockSummary& here = map_.summary(fresh.x, fresh.y);
+    for (int y = fresh.y - kReach; y <= fresh.y + kReach; ++y)
+        for (int x = fresh.x - kReach; x <= fresh.x + kReach; ++x) {
+            if (!is_wanted({x, y})) continue;
+            const Surrounding around(map_, x, y);
+            const auto* const end = std::end(around.block);
+            if (std::find(std::begin(around.block), end, fresh) == end) continue;
+            const auto* const other =
+                std::find_if(std::begin(around.block), end, [&](Vec2i o) { return !(o == fresh); });
+            if (other != end && here.uniform && here.key == map_.summary(other->x, other->y).key) continue;
+            blocks.push_back({x, y});
+        }
 }
 
 /// Whether a traced block shows that something else than what follows from the lattice goes on in

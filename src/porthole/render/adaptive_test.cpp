@@ -3,6 +3,7 @@
 
 #include "porthole/render/compare.h"
 #include "porthole/render/render.h"
+#include "porthole/render/sampling.h"
 #include "porthole/render/test_scene.h"
 #include "porthole/scene/camera.h"
 
@@ -67,6 +68,23 @@ TEST(Adaptive, FollowsAThreadThatNoLatticeBlockMeets) {
     EXPECT_GT(thread_pixels(full), 300);
     EXPECT_EQ(thread_pixels(fast), thread_pixels(full));
     EXPECT_EQ(compare_frames(fast, full, {1, 1, 1}).wrong_ids, 0);
+}
+
+TEST(Adaptive, FindsManySpecks) {
+    // Smaller than a block, most of them on none of the first lattice, nothing behind them.
+    Scene s;
+    s.materials = {matte({0.1f, 0.2f, 0.7f})};
+    for (int i = 0; i < 600; ++i) {
+        const Vec2f at = pixel_sample(i);
+        const Vec3f p{(at.x - 0.5f) * 4, (at.y - 0.5f) * 3, float(i % 7) * 0.1f};
+        add_part(s, box_mesh(p, p + Vec3f{0.011f, 0.013f, 0.012f}), "speck");
+    }
+    const Stand stand(std::move(s));
+    const View view = look_at({0, 0, 6}, {0, 0, 0}, 960, 540, 0.35f);
+    const Refinement c = stand.compare(view, {.samples = 1});
+    EXPECT_EQ(c.wrong_ids, 0);
+    EXPECT_TRUE(c.missed.empty());
+    EXPECT_LT(c.traced, c.pixels / 2);
 }
 
 TEST(Adaptive, TracesCameraRaysWhereColorsCannotBeInferred) {
