@@ -82,8 +82,8 @@ template <typename T> class SparseImage {
 public:
     explicit SparseImage(Rect window) : window_(window) {
         if (window.empty()) return;
-        pixels_.reset(static_cast<T*>(
-            std::calloc(std::size_t(window.width()) * std::size_t(window.height()), sizeof(T))));
+        pixels_.reset(
+            static_cast<T*>(std::calloc(std::size_t(window.width()) * std::size_t(window.height()), sizeof(T))));
         if (!pixels_) throw std::bad_alloc();
     }
     [[nodiscard]] Rect window() const { return window_; }
