@@ -150,14 +150,15 @@ void add_picture(CLI::App& app, PictureOptions& o) {
     app.add_flag_callback(
         "--no-shadows", [&o] { o.render.shadows = false; }, "No shadows");
     RefineParams& by = o.render.refine_by;
-    add_choice<Refine>(app, "--refine", o.render.refine,
-                       {{"full", Refine::full},
-                        {"adaptive", Refine::adaptive},
-                        {"paper1", Refine::paper1},
-                        {"paper2", Refine::paper2},
-                        {"expansion", Refine::expansion}},
-                       "Which pixels are traced: all of them; where blocks differ; or as the paper does, by its two "
-                       "versions of selective refinement or by selective expansion, one sample a pixel (default adaptive)");
+    add_choice<Refine>(
+        app, "--refine", o.render.refine,
+        {{"full", Refine::full},
+         {"adaptive", Refine::adaptive},
+         {"paper1", Refine::paper1},
+         {"paper2", Refine::paper2},
+         {"expansion", Refine::expansion}},
+        "Which pixels are traced: all of them; where blocks differ; or as the paper does, by its two "
+        "versions of selective refinement or by selective expansion, one sample a pixel (default adaptive)");
     app.add_option("--macro", by.macro_px, "Size in pixels of the paper's macro pixels, a power of two (default 8)")
         ->type_name("N");
     app.add_option("--threshold", by.threshold_px, "The paper's smallest block in pixels, a power of two (default 1)")
