@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "porthole/render/closure.h"
+
 #include "porthole/base/tile_loop.h"
 #include "porthole/render/preview.h"
 
@@ -14,15 +16,9 @@ namespace {
 // What may be inferred. Colours are encoded as files have them, so errors are as the eye sees them.
 constexpr float kColorError = 0.012f;   ///< estimated, half way between two traced blocks
 constexpr float kDepthError = 1.0f;     ///< the same, pixels
-constexpr float kAmbientStep = 0.25f;   ///< of the open share, from block to block
-constexpr float kLampStep = 0.02f;      ///< of the lamps' share
 constexpr float kSmooth = 0.9f;         ///< cosine between normals of one surface
 constexpr float kFlat = 0.98f;          ///< the same, within a block of which corners tell the rest
-constexpr float kOneSurface = 0.8f;     ///< the same, farther apart
-constexpr float kOffPlane = 1.5f;       ///< pixels by which neighbours of one surface leave its plane
 constexpr float kLeastRoughness = 0.3f; ///< smoother materials may mirror what is around them
-constexpr std::size_t kSeeds = 32;      ///< vertices of a part that are looked for
-constexpr float kHidden = 0.999f;       ///< a vertex behind this share of its depth is hidden
 
 /// Whether colours of a material vary with nothing but geometry and light.
 bool is_plain(const Material& m) {
@@ -37,10 +33,6 @@ template <typename Body> void for_tiles(const Picture& picture, const Control& c
     parallel_for_tiles(picture.buffer.window(), FilteredTile::kSize, control, body);
 }
 
-Rect blocks_of(Rect tile) {
-    return {tile.x0 / kCell, tile.y0 / kCell, (tile.x1 - 1) / kCell + 1, (tile.y1 - 1) / kCell + 1};
-}
-
 float encoded(float v) { return std::sqrt(std::max(v, 0.0f)); }
 
 /// Error at the middle of a gap whose ends have values b and c, where the blocks beside it run
@@ -49,15 +41,6 @@ float middle_error(float a, float b, int ab, float c, float d, int cd, int gap) 
     const float slope = (c - b) / float(gap);
     const float before = ab > 0 ? (b - a) / float(ab) : slope, after = cd > 0 ? (d - c) / float(cd) : slope;
     return 0.25f * float(gap) * std::max(std::abs(before - slope), std::abs(after - slope));
-}
-
-/// Blocks, each once, those of a tile together.
-std::vector<Vec2i> in_order(std::vector<Vec2i> blocks) {
-    constexpr int kTileBlocks = FilteredTile::kSize / kCell;
-    const auto key = [](Vec2i b) { return std::array<int, 4>{b.y / kTileBlocks, b.x / kTileBlocks, b.y, b.x}; };
-    std::sort(blocks.begin(), blocks.end(), [&](Vec2i a, Vec2i b) { return key(a) < key(b); });
-    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
-    return blocks;
 }
 
 /// One picture being refined. A loop that is stopped goes on when run again: items it has done
@@ -89,15 +72,10 @@ private:
     void decide_cells(int level);
     [[nodiscard]] BlockMap::Cell agreement(int level, Vec2i a, Vec2i b) const;
     [[nodiscard]] bool is_straight(Vec2i a, Vec2i b) const;
-    [[nodiscard]] std::vector<Vec2i> seeds() const;
-    [[nodiscard]] std::vector<Vec2i> seeds_of(PartId part) const;
     void settle_cells();
     void trace_blocks(std::span<const Vec2i> blocks);
     void follow();
     [[nodiscard]] std::vector<Vec2i> traced_blocks() const;
-    [[nodiscard]] std::vector<Vec2i> contradicted_by(std::span<const Vec2i> fresh) const;
-    void add_contradicted(Vec2i fresh, std::vector<Vec2i>& blocks) const;
-    [[nodiscard]] bool contradicts(Vec2i traced, Vec2i b) const;
     void take_light();
     bool light_fits(int bx, int by);
     void settle();
@@ -130,7 +108,7 @@ void Refinement::take_step() {
     switch (next_ - 3 * LatticeAxis::kLevels) {
     case 0: return settle_cells();
     case 1: return trace_differing();
-    case 2: front_ = seeds(); return;
+    case 2: front_ = seed_blocks(picture_, stage_, map_, control_); return;
     case 3: return trace_blocks(front_);
     case 4: front_ = traced_blocks(); return;
     case 5: return follow();
@@ -387,49 +365,6 @@ bool Refinement::is_straight(Vec2i a, Vec2i b) const {
     return true;
 }
 
-std::vector<Vec2i> Refinement::seeds_of(PartId id) const {
-    const Scene& scene = stage_.scene;
-    const Part& part = scene.parts[index(id)];
-    const Mesh& mesh = scene.meshes[part.mesh];
-    const Affine3f place(part.world_from_mesh);
-    std::vector<Vec2i> found;
-    const auto look = [&](Vec3f point) {
-        const PixelPoint p = picture_.view.project(place.point(point));
-        if (!(p.depth > 0) || !(p.x >= float(map_.window.x0)) || !(p.x < float(map_.window.x1)) ||
-            !(p.y >= float(map_.window.y0)) || !(p.y < float(map_.window.y1)))
-            return;
-        const int x = int(p.x), y = int(p.y), bx = x / kCell, by = y / kCell;
-        if (map_.state(bx, by) != BlockMap::wanted) return;
-        const Surrounding around(map_, bx, by);
-        const IdBuffer& ids = picture_.buffer.ids;
-        if (ids.id(around.left_of(x), around.top_of(y)) == id) return;
-        if (around.mix(x, y, [&](int cx, int cy) { return ids.depth(cx, cy); }) < kHidden * p.depth) return;
-        found.push_back({bx, by});
-    };
-    const std::size_t n = mesh.positions.size();
-    for (std::size_t k = 0; k < std::min(n, kSeeds); ++k) look(mesh.positions[k * n / std::min(n, kSeeds)]);
-    if (n == 0)
-        for (int k = 0; k < 8; ++k) look(mesh.bounds.corner(k));
-    return found;
-}
-
-std::vector<Vec2i> Refinement::seeds() const {
-    std::vector<PartId> parts;
-    for (const PartId id : all_parts(stage_.scene))
-        if (stage_.bvh.holds(id)) parts.push_back(id);
-    constexpr std::size_t kRun = 64;
-    std::vector<std::vector<Vec2i>> runs((parts.size() + kRun - 1) / kRun);
-    parallel_for(runs.size(), control_, [&](std::size_t r) {
-        for (std::size_t i = r * kRun; i < std::min(parts.size(), (r + 1) * kRun); ++i) {
-            const std::vector<Vec2i> found = seeds_of(parts[i]);
-            runs[r].insert(runs[r].end(), found.begin(), found.end());
-        }
-    });
-    std::vector<Vec2i> all;
-    for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
-    return in_order(std::move(all));
-}
-
 /// Each once, in an order in which neighbours lie close.
 void Refinement::trace_blocks(std::span<const Vec2i> blocks) {
     constexpr std::size_t kRun = 64;
@@ -444,7 +379,7 @@ void Refinement::trace_blocks(std::span<const Vec2i> blocks) {
 void Refinement::follow() {
     while (!front_.empty()) {
         trace_blocks(front_);
-        front_ = contradicted_by(front_);
+        front_ = contradicted_by(picture_, map_, front_, control_);
     }
 }
 
@@ -455,86 +390,6 @@ std::vector<Vec2i> Refinement::traced_blocks() const {
         for (int bx = area.x0; bx < area.x1; ++bx)
             if (map_.state(bx, by) == BlockMap::traced) blocks.push_back({bx, by});
     return blocks;
-}
-
-/// Neighbours of `fresh` blocks, in_order(), that have to be traced as well.
-std::vector<Vec2i> Refinement::contradicted_by(std::span<const Vec2i> fresh) const {
-    constexpr std::size_t kRun = 256;
-    std::vector<std::vector<Vec2i>> runs((fresh.size() + kRun - 1) / kRun);
-    parallel_for(runs.size(), control_, [&](std::size_t r) {
-        for (std::size_t i = r * kRun; i < std::min(fresh.size(), (r + 1) * kRun); ++i)
-            add_contradicted(fresh[i], runs[r]);
-    });
-    std::vector<Vec2i> all;
-    for (const std::vector<Vec2i>& run : runs) all.insert(all.end(), run.begin(), run.end());
-    return in_order(std::move(all));
-}
-
-void Refinement::add_contradicted(Vec2i fresh, std::vector<Vec2i>& blocks) const {
-    const auto is_wanted = [&](Vec2i b) { return map_.state.at_or(b.x, b.y, BlockMap::unused) == BlockMap::wanted; };
-    for (const Vec2i d : {Vec2i{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-        const Vec2i b{fresh.x + d.x, fresh.y + d.y};
-        if (is_wanted(b) && contradicts(fresh, b)) blocks.push_back(b);
-    }
-    if (map_.allows(fresh.x, fresh.y) != BlockMap::one_color) return;
-    // It was assumed to be like the blocks beside it, and others follow from it.
-    constexpr int kReach = 4;
-    const BlockSummary& here = map_.summary(fresh.x, fresh.y);
-    for (int y = fresh.y - kReach; y <= fresh.y + kReach; ++y)
-        for (int x = fresh.x - kReach; x <= fresh.x + kReach; ++x) {
-            if (!is_wanted({x, y})) continue;
-            const Surrounding around(map_, x, y);
-            const auto* const end = std::end(around.block);
-            if (std::find(std::begin(around.block), end, fresh) == end) continue;
-            const auto* const other =
-                std::find_if(std::begin(around.block), end, [&](Vec2i o) { return !(o == fresh); });
-            if (other != end && here.uniform && here.key == map_.summary(other->x, other->y).key) continue;
-            blocks.push_back({x, y});
-        }
-}
-
-/// Whether a traced block shows that something else than what follows from the lattice goes on in
-/// its neighbour `b`.
-bool Refinement::contradicts(Vec2i traced, Vec2i b) const {
-    const Surrounding around(map_, b.x, b.y);
-    // What the lattice was decided by has been compared, but not what was assumed of it.
-    const bool decided = map_.allows(traced.x, traced.y) != BlockMap::one_color;
-    if (decided && std::find(std::begin(around.block), std::end(around.block), traced) != std::end(around.block))
-        return false;
-    const GBuffer& buffer = picture_.buffer;
-    const Rect t = map_.pixels(traced.x, traced.y), r = map_.pixels(b.x, b.y);
-    const int dx = b.x - traced.x, dy = b.y - traced.y;
-    const BlockSummary& here = map_.summary(traced.x, traced.y);
-    const std::uint32_t key = map_.summary(around.block[0].x, around.block[0].y).key;
-    if (here.uniform && here.key == key && key != GBuffer::kNoKey) {
-        const float ambient = around.mix_blocks(map_, r.x0, r.y0, [](const BlockSummary& s) { return s.ambient(); });
-        if (std::abs(here.ambient() - ambient) > 2 * kAmbientStep) return true;
-        for (int c = 0; c < 3; ++c) {
-            const float lamp = around.mix_blocks(map_, r.x0, r.y0, [c](const BlockSummary& s) { return s.lamps[c]; });
-            if (std::abs(here.lamps[c] - lamp) > 255.0f * 2 * kLampStep) return true;
-        }
-    }
-    if (map_.allows(b.x, b.y) != BlockMap::one_color) return false;
-    const int n = dx != 0 ? std::min(t.height(), r.height()) : std::min(t.width(), r.width());
-    const auto border = [](int d, int low, int high) { return d > 0 ? high - 1 : low; };
-    for (int i = 0; i < n; ++i) {
-        const Vec2i p{dx != 0 ? border(dx, t.x0, t.x1) : t.x0 + i, dy != 0 ? border(dy, t.y0, t.y1) : t.y0 + i};
-        if (buffer.key(p.x, p.y) != key) return true;
-        if (key == GBuffer::kNoKey) continue;
-        const Vec2i q{p.x + dx, p.y + dy};
-        const float depth = 1.0f / around.mix(q.x, q.y, [&](int x, int y) { return 1.0f / buffer.ids.depth(x, y); });
-        const auto position = [&](Vec2i pixel, float z) {
-            const Ray ray = picture_.view.ray(float(pixel.x) + 0.5f, float(pixel.y) + 0.5f);
-            return ray.origin + ray.direction * (z / ray.depth_per_t);
-        };
-        const Vec3f step = position(q, depth) - position(p, buffer.ids.depth(p.x, p.y));
-        const Vec3f normal = unpack_normal(buffer.pixels(p.x, p.y).normal);
-        if (std::abs(dot(step, normal)) > kOffPlane * picture_.view.pixel_size(depth)) return true;
-        const Pixel& nearest = buffer.pixels(around.tx(q.x) < 0.5f ? around.left_of(q.x) : around.right_of(q.x),
-                                             around.ty(q.y) < 0.5f ? around.top_of(q.y) : around.bottom_of(q.y));
-        if (dot(normal, unpack_normal(nearest.normal)) < kOneSurface) return true;
-    }
-    return false;
 }
 
 /// Camera rays of the blocks whose light alone is inferred; light too where it does not fit.
@@ -661,62 +516,6 @@ void Refinement::settle() {
 
 } // namespace
 
-BlockMap::BlockMap(const Picture& picture)
-    : window(picture.buffer.window()), columns(window.x0 / kCell, (window.x1 - 1) / kCell),
-      rows(window.y0 / kCell, (window.y1 - 1) / kCell),
-      state(Rect{window.x0 / kCell, window.y0 / kCell, (window.x1 - 1) / kCell + 1, (window.y1 - 1) / kCell + 1}),
-      allows(state.window(), differs), level(state.window()), summary(state.window()) {
-    for (int lattice = 0; lattice < LatticeAxis::kLevels; ++lattice) {
-        cells[lattice] = Mask(columns.cells(lattice), rows.cells(lattice), differs);
-        across[lattice] = Mask(columns.cells(lattice), rows.blocks(lattice), differs);
-        down[lattice] = Mask(columns.blocks(lattice), rows.cells(lattice), differs);
-    }
-    const Rect a = area();
-    if (picture.everything) std::fill(state.pixels().begin(), state.pixels().end(), wanted);
-    for (int by = a.y0; by < a.y1 && !picture.everything; ++by)
-        for (int bx = a.x0; bx < a.x1; ++bx) {
-            const Rect r = pixels(bx, by);
-            for (int y = r.y0; y < r.y1; ++y)
-                for (int x = r.x0; x < r.x1; ++x)
-                    if (picture.buffer.pixels(x, y).has(Pixel::traced)) state(bx, by) = wanted;
-        }
-}
-
-BlockMap::Cell BlockMap::between_two(int lattice, int bx, int by) const {
-    const bool in_column = columns.on_lattice(lattice, bx), in_row = rows.on_lattice(lattice, by);
-    if (in_column == in_row) return differs;
-    const int column = columns.index(lattice, bx), row = rows.index(lattice, by);
-    return Cell(in_row ? across[lattice](column, row) : down[lattice](column, row));
-}
-
-BlockMap::Cell BlockMap::allowed(int lattice, int bx, int by) const {
-    const LatticeAxis::Place x = columns.place(lattice, bx), y = rows.place(lattice, by);
-    if (lattice == LatticeAxis::kFinest && (x.low == bx) != (y.low == by)) return between_two(lattice, bx, by);
-    std::uint8_t least = one_color;
-    for (int cy = y.cell_low; cy <= y.cell_high; ++cy)
-        for (int cx = x.cell_low; cx <= x.cell_high; ++cx) least = std::min(least, cells[lattice](cx, cy));
-    return Cell(least);
-}
-
-bool BlockMap::is_busy(Rect tile) const {
-    const Rect blocks = blocks_of(tile).grown(1).intersected(area());
-    for (int by = blocks.y0; by < blocks.y1; ++by)
-        for (int bx = blocks.x0; bx < blocks.x1; ++bx)
-            if (state(bx, by) == traced || (state(bx, by) == wanted && allows(bx, by) == one_light)) return true;
-    return false;
-}
-
-Surrounding::Surrounding(const BlockMap& map, int lattice, int bx, int by) {
-    const LatticeAxis::Place column = map.columns.place(lattice, bx), row = map.rows.place(lattice, by);
-    block[0] = {column.low, row.low}, block[1] = {column.high, row.low};
-    block[2] = {column.low, row.high}, block[3] = {column.high, row.high};
-    between_columns = column.low != column.high, between_rows = row.low != row.high;
-    left = (column.low + 1) * kCell - 1, right = column.high * kCell;
-    top = (row.low + 1) * kCell - 1, bottom = row.high * kCell;
-    // Blocks that another one follows are whole, but for the first ones' missing left and upper pixels.
-    x_step = 1.0f / float(std::max(1, right - left)), y_step = 1.0f / float(std::max(1, bottom - top));
-}
-
 struct AdaptiveGather::Work {
     Refinement refinement;
 };
@@ -727,50 +526,5 @@ AdaptiveGather::~AdaptiveGather() = default;
 void AdaptiveGather::trace_lattice(const Control& control) { work_->refinement.run_to_preview(control); }
 void AdaptiveGather::trace_rest(const Control& control) { work_->refinement.run_to_end(control); }
 const BlockMap& AdaptiveGather::map() const { return work_->refinement.map(); }
-
-void shade_blocks(Picture& picture, const Stage& stage, const BlockMap& map, Rect tile) {
-    GBuffer& buffer = picture.buffer;
-    std::vector<Vec2i> todo;
-    const Rect area = blocks_of(tile);
-    for (int by = area.y0; by < area.y1; ++by)
-        for (int bx = area.x0; bx < area.x1; ++bx) {
-            if (map.state(bx, by) == BlockMap::unused || map.is_inferred(bx, by)) continue;
-            const Rect r = map.pixels(bx, by);
-            if (map.state(bx, by) != BlockMap::settled || !map.summary(bx, by).has_corners) {
-                for (int y = r.y0; y < r.y1; ++y)
-                    for (int x = r.x0; x < r.x1; ++x)
-                        if (buffer.pixels(x, y).has(Pixel::traced)) todo.push_back({x, y});
-                continue;
-            }
-            const Vec4f a = picture.color(r.x0, r.y0), b = picture.color(r.x1 - 1, r.y0);
-            const Vec4f c = picture.color(r.x0, r.y1 - 1), d = picture.color(r.x1 - 1, r.y1 - 1);
-            const PixelLight light(buffer.pixels(r.x0, r.y0).reach()); // of all its pixels
-            for (int y = r.y0; y < r.y1; ++y) {
-                const float ty = r.height() > 1 ? float(y - r.y0) / float(r.height() - 1) : 0.0f;
-                const Vec4f left = a + (c - a) * ty, right = b + (d - b) * ty;
-                for (int x = r.x0; x < r.x1; ++x) {
-                    const float tx = r.width() > 1 ? float(x - r.x0) / float(r.width() - 1) : 0.0f;
-                    picture.color(x, y) = left + (right - left) * tx;
-                    buffer.light(x, y) = light;
-                }
-            }
-        }
-    shade_pixels(picture, stage, tile, todo);
-}
-
-void infer_colors(Picture& picture, const BlockMap& map, int level, Rect tile) {
-    const Rect area = blocks_of(tile);
-    for (int by = area.y0; by < area.y1; ++by)
-        for (int bx = area.x0; bx < area.x1; ++bx) {
-            if (!map.is_inferred(bx, by) || map.level(bx, by) != level) continue;
-            const Rect r = map.pixels(bx, by);
-            const Surrounding around(map, bx, by);
-            for (int y = r.y0; y < r.y1; ++y) std::fill_n(&picture.inferred(r.x0, y), r.width(), std::uint8_t{1});
-            if (map.summary(around.block[0].x, around.block[0].y).key == GBuffer::kNoKey) continue; // as it is
-            around.mix_all(
-                r, [&](int x, int y) { return picture.color(x, y); },
-                [&](int x, int y, Vec4f color) { picture.color(x, y) = color; });
-        }
-}
 
 } // namespace porthole
