@@ -5,8 +5,8 @@
 // one surface in one light, what lies between is inferred; elsewhere the lattice is halved, and halved again,
 // then every block is traced. At last each traced block that contradicts what was inferred beside it
 // has that neighbour traced as well, and so on: the paper's contour following, lifted from pixels
-// to blocks. The set of traced blocks is the least that this closure allows, so it does not
-// depend on the order of work.
+// to blocks. Rounds of it follow one another whole, so the result
+// does not depend on the order of work.
 #pragma once
 
 #include <memory>
