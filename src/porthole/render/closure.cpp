@@ -120,9 +120,7 @@ void add_contradicted(const Picture& picture, const BlockMap& map, Vec2i fresh, 
 
 std::vector<Vec2i> seed_blocks(const Picture& picture, const Stage& stage, const BlockMap& map,
                                const Control& control) {
-    std::vector<PartId> parts;
-    for (const PartId id : all_parts(stage.scene))
-        if (stage.bvh.holds(id)) parts.push_back(id);
+    const std::span<const PartId> parts = stage.bvh.hittable();
     constexpr std::size_t kRun = 64;
     std::vector<std::vector<Vec2i>> runs((parts.size() + kRun - 1) / kRun);
     parallel_for(runs.size(), control, [&](std::size_t r) {

@@ -338,6 +338,9 @@ Bvh::~Bvh() = default;
 const Scene& Bvh::scene() const { return *state_->meshes->scene; }
 const CapMesh* Bvh::caps() const { return state_->caps; }
 bool Bvh::empty() const { return state_->part_of_instance.empty(); }
+std::span<const PartId> Bvh::hittable() const {
+    return std::span(state_->part_of_instance).first(state_->part_of_instance.size() - (state_->caps ? 1 : 0));
+}
 bool Bvh::holds(PartId part) const {
     return porthole::index(part) < state_->held.size() && state_->held[porthole::index(part)];
 }

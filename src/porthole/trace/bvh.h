@@ -123,6 +123,9 @@ public:
     [[nodiscard]] const CapMesh* caps() const;   ///< null without
     [[nodiscard]] bool empty() const;            ///< no parts
     [[nodiscard]] bool holds(PartId part) const; ///< among the parts it was built from
+    /// Of these the ones that can be hit: not empty, of coinciding ones a single one. In an order
+    /// that does not depend on that of the parts.
+    [[nodiscard]] std::span<const PartId> hittable() const;
 
 private:
     std::unique_ptr<State> state_;
