@@ -63,7 +63,7 @@ std::vector<std::byte> deflated(std::span<const Bytef> raw, bool last) {
     z.avail_out = uInt(out.size());
     const int result = ::deflate(&z, last ? Z_FINISH : Z_SYNC_FLUSH);
     if (result != (last ? Z_STREAM_END : Z_OK) || z.avail_in != 0) refuse("zlib reports " + std::to_string(result));
-    out.resize(out.size() - z.avail_out);
+    out.erase(out.end() - z.avail_out, out.end());
     return out;
 }
 
