@@ -288,7 +288,7 @@ void check_reveal(const MeshBvhs& meshes, const Report& reported, const CheckPar
         if (full.contours == ContourMethod::paper)
             // Step 1 of the paper may miss a target: then it is none.
             std::erase_if(plan.opened, [&](PartId id) {
-                const std::vector<PartId>& ids = plan.target_ids.id.pixels();
+                const std::span<const PartId> ids = plan.target_ids.id.pixels();
                 return std::find(ids.begin(), ids.end(), id) == ids.end();
             });
         if (full.style != HoleStyle::paper && !plan.ghost) {

@@ -170,7 +170,7 @@ CapReport report_caps(const Scene& scene, const ViewPlan& plan, const Frame& aft
     for (const PartId id : plan.caps.open) r.open.push_back(path(id));
     for (const PartId id : plan.caps.partly_open) r.partly_open.push_back(path(id));
     for (const PartId id : plan.caps.around_eye) r.around_eye.push_back(path(id));
-    const std::vector<std::uint8_t>& inside = after.inside.pixels();
+    const std::span<const std::uint8_t> inside = after.inside.pixels();
     r.cap_pixels = std::count(inside.begin(), inside.end(), std::uint8_t(Frame::cap));
     r.open_back_pixels = std::count(inside.begin(), inside.end(), std::uint8_t(Frame::open_back));
     return r;

@@ -127,7 +127,7 @@ TEST_P(FrameJobs, ShowAWholePictureAtEveryStep) {
                 expect_traced_ids(frame, full);
                 if (steps.size() > 1) continue;
                 EXPECT_LT(frame.rays.all(), full.rays.all() / 10);
-                const std::vector<std::uint8_t>& inferred = frame.inferred.pixels();
+                const std::span<const std::uint8_t> inferred = frame.inferred.pixels();
                 EXPECT_GT(std::count(inferred.begin(), inferred.end(), 1), std::ptrdiff_t(inferred.size()) * 9 / 10);
                 // It is the picture that follows, blurred: most pixels already see the part they will.
                 int right = 0, in_hole = 0, right_in_hole = 0;

@@ -1,14 +1,17 @@
 // A rectangle of pixels and a row-major image. Pixel (0,0) is top-left, its centre (0.5, 0.5).
 #pragma once
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <new>
+#include <span>
 #include <type_traits>
-#include <vector>
+#include <utility>
 
 #include "porthole/base/math.h"
 
@@ -35,45 +38,82 @@ struct Rect {
 void expect_use(void* memory, std::size_t bytes);
 
 /// Row-major pixels of `window`; coordinates are absolute, so that a crop and the
-/// full picture share them.
+/// full picture share them. Pixels whose bytes are all zero cost nothing to create: the system
+/// hands out their memory so, where and when it is first touched.
 template <typename T> class Image {
+    static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+
 public:
     Image() = default;
     explicit Image(Rect window, T fill = T{}) : window_(window) {
         if (window.empty()) return;
-        const std::size_t n = std::size_t(window.width()) * std::size_t(window.height());
-        pixels_.reserve(n);
-        expect_use(pixels_.data(), n * sizeof(T));
-        pixels_.resize(n, fill);
+        const bool zeros = is_zeros(fill);
+        allocate(std::size_t(window.width()) * std::size_t(window.height()), zeros);
+        expect_use(pixels_.get(), size_ * sizeof(T));
+        if (!zeros) std::uninitialized_fill_n(pixels_.get(), size_, fill);
     }
     Image(std::int32_t width, std::int32_t height, T fill = T{}) : Image(Rect{0, 0, width, height}, fill) {}
+    Image(const Image& other) : window_(other.window_) {
+        if (other.empty()) return;
+        allocate(other.size_, false);
+        expect_use(pixels_.get(), size_ * sizeof(T));
+        std::uninitialized_copy_n(other.pixels_.get(), size_, pixels_.get());
+    }
+    Image(Image&& other) noexcept { swap(other); }
+    Image& operator=(Image other) noexcept {
+        swap(other);
+        return *this;
+    }
+    ~Image() = default;
 
     [[nodiscard]] Rect window() const { return window_; }
     [[nodiscard]] std::int32_t width() const { return window_.width(); }
     [[nodiscard]] std::int32_t height() const { return window_.height(); }
-    [[nodiscard]] bool empty() const { return pixels_.empty(); }
+    [[nodiscard]] bool empty() const { return size_ == 0; }
     [[nodiscard]] bool contains(std::int32_t x, std::int32_t y) const { return window_.contains(x, y); }
 
-    T& operator()(std::int32_t x, std::int32_t y) { return pixels_[index(x, y)]; }
-    const T& operator()(std::int32_t x, std::int32_t y) const { return pixels_[index(x, y)]; }
+    T& operator()(std::int32_t x, std::int32_t y) { return pixels_.get()[index(x, y)]; }
+    const T& operator()(std::int32_t x, std::int32_t y) const { return pixels_.get()[index(x, y)]; }
     /// The pixel at (x, y), or `outside` beyond the window.
     [[nodiscard]] T at_or(std::int32_t x, std::int32_t y, T outside) const {
         return contains(x, y) ? (*this)(x, y) : outside;
     }
-    T* row(std::int32_t y) { return pixels_.data() + index(window_.x0, y); }
-    const T* row(std::int32_t y) const { return pixels_.data() + index(window_.x0, y); }
-    std::vector<T>& pixels() { return pixels_; }
-    [[nodiscard]] const std::vector<T>& pixels() const { return pixels_; }
+    T* row(std::int32_t y) { return pixels_.get() + index(window_.x0, y); }
+    const T* row(std::int32_t y) const { return pixels_.get() + index(window_.x0, y); }
+    std::span<T> pixels() { return {pixels_.get(), size_}; }
+    [[nodiscard]] std::span<const T> pixels() const { return {pixels_.get(), size_}; }
 
     [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y) const {
         assert(contains(x, y));
         return std::size_t(y - window_.y0) * std::size_t(window_.width()) + std::size_t(x - window_.x0);
     }
-    friend bool operator==(const Image&, const Image&) = default;
+    friend bool operator==(const Image& a, const Image& b) {
+        return a.window_ == b.window_ && std::ranges::equal(a.pixels(), b.pixels());
+    }
 
 private:
+    struct Free {
+        void operator()(T* p) const { std::free(p); }
+    };
+    static bool is_zeros(const T& value) {
+        constexpr unsigned char zeros[sizeof(T)] = {};
+        return std::memcmp(&value, zeros, sizeof(T)) == 0;
+    }
+    void allocate(std::size_t n, bool zeros) {
+        if (n > std::size_t(PTRDIFF_MAX) / sizeof(T)) throw std::bad_alloc();
+        pixels_.reset(static_cast<T*>(zeros ? std::calloc(n, sizeof(T)) : std::malloc(n * sizeof(T))));
+        if (!pixels_) throw std::bad_alloc();
+        size_ = n;
+    }
+    void swap(Image& other) noexcept {
+        std::swap(window_, other.window_);
+        std::swap(pixels_, other.pixels_);
+        std::swap(size_, other.size_);
+    }
+
     Rect window_;
-    std::vector<T> pixels_;
+    std::unique_ptr<T[], Free> pixels_;
+    std::size_t size_ = 0;
 };
 
 /// Pixels that start as zeros and of which most may never be touched: memory is taken a page at a

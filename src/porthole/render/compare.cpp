@@ -16,11 +16,11 @@ Refinement compare_frames(const Frame& frame, const Frame& full, Vec3f backgroun
     assert(frame.color.window() == full.color.window());
     Refinement c;
     c.pixels = std::int64_t(full.color.pixels().size());
-    const std::vector<std::uint8_t>& inferred = frame.inferred.pixels();
+    const std::span<const std::uint8_t> inferred = frame.inferred.pixels();
     c.traced = c.pixels - std::count(inferred.begin(), inferred.end(), std::uint8_t(1));
     c.rays = frame.rays, c.full_rays = full.rays;
 
-    const std::vector<PartId>&found = frame.ids.id.pixels(), &right = full.ids.id.pixels();
+    const std::span<const PartId> found = frame.ids.id.pixels(), right = full.ids.id.pixels();
     std::vector<std::uint8_t> shown;
     const auto note = [&](PartId id, std::uint8_t bit) {
         if (id == kNoPart) return;

@@ -14,10 +14,16 @@ LatticeAxis::LatticeAxis(int first, int last) : first_(first) {
         if (last > first) blocks_[level].push_back(last);
     }
     for (int level = 0; level < kLevels; ++level) {
+        const std::vector<int>& b = blocks_[level];
+        const int last_cell = cells(level) - 1;
         int k = 0;
-        for (int b = first; b <= last; ++b) {
-            if (k + 1 < int(blocks_[level].size()) && blocks_[level][std::size_t(k + 1)] == b) ++k;
-            below_[level].push_back(k);
+        for (int block = first; block <= last; ++block) {
+            if (k + 1 < int(b.size()) && b[std::size_t(k + 1)] == block) ++k;
+            const int low = b[std::size_t(k)];
+            if (low == block)
+                places_[level].push_back({low, low, std::clamp(k - 1, 0, last_cell), std::min(k, last_cell), k});
+            else
+                places_[level].push_back({low, b[std::size_t(k + 1)], k, k, k});
         }
     }
 }
@@ -27,14 +33,6 @@ int LatticeAxis::cells(int level) const { return std::max(1, int(blocks_[level].
 std::pair<int, int> LatticeAxis::cell(int level, int index) const {
     const std::vector<int>& b = blocks_[level];
     return {b[std::size_t(index)], b[std::min(std::size_t(index) + 1, b.size() - 1)]};
-}
-
-LatticeAxis::Place LatticeAxis::place(int level, int block) const {
-    const std::vector<int>& b = blocks_[level];
-    const int k = below_[level][std::size_t(block - first_)], last = cells(level) - 1;
-    const int low = b[std::size_t(k)];
-    if (low == block) return {low, low, std::clamp(k - 1, 0, last), std::min(k, last)};
-    return {low, b[std::size_t(k + 1)], k, k};
 }
 
 int LatticeAxis::parent(int level, int cell) const {

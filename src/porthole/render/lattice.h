@@ -20,13 +20,14 @@ public:
     struct Place {
         int low, high;
         int cell_low, cell_high;
+        int index; ///< of `low` among the lattice's blocks
     };
-    [[nodiscard]] Place place(int level, int block) const;
+    [[nodiscard]] const Place& place(int level, int block) const { return places_[level][std::size_t(block - first_)]; }
     [[nodiscard]] bool on_lattice(int level, int block) const { return place(level, block).low == block; }
     [[nodiscard]] int blocks(int level) const { return int(blocks_[level].size()); } ///< of the lattice
     [[nodiscard]] int block(int level, int index) const { return blocks_[level][std::size_t(index)]; }
     /// Which block of the lattice is the last not beyond `block`.
-    [[nodiscard]] int index(int level, int block) const { return below_[level][std::size_t(block - first_)]; }
+    [[nodiscard]] int index(int level, int block) const { return place(level, block).index; }
     /// Cells lie between neighbouring lattice blocks; there is at least one.
     [[nodiscard]] int cells(int level) const;
     [[nodiscard]] std::pair<int, int> cell(int level, int index) const; ///< its first and last block
@@ -34,8 +35,8 @@ public:
 
 private:
     int first_;
-    std::vector<int> blocks_[kLevels]; ///< of the lattice, increasing
-    std::vector<int> below_[kLevels];  ///< by block: index of the last lattice block not beyond it
+    std::vector<int> blocks_[kLevels];   ///< of the lattice, increasing
+    std::vector<Place> places_[kLevels]; ///< by block
 };
 
 } // namespace porthole
