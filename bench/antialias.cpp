@@ -36,9 +36,12 @@ void add_antialias(const Settings& settings) {
             add("antialias/" + spec.name + '/' + what,
                 [=](benchmark::State& state) { picture(state, spec, height_px, params); });
         };
-        add_picture("one", {.samples = 1});
+        add_picture("one", {.samples = 1, .refine = Refine::full});
         add_picture("uniform:16", {.samples = 16, .uniform = true});
-        for (const int n : {4, 8, 16, 32}) add_picture("edges:" + std::to_string(n), {.samples = n});
+        for (const int n : {8, 16, 32, 64}) {
+            add_picture("edges:" + std::to_string(n), {.samples = n, .refine = Refine::full});
+            add_picture("adaptive:" + std::to_string(n), {.samples = n});
+        }
     }
 }
 

@@ -106,15 +106,16 @@ class Table:
     def antialias(self):
         for m in self.named(r"antialias/(\w+)/uniform:16"):
             uniform = self.get(m[0])
-            edges = [(self.get(e[0]), e[1]) for e in self.named(rf"antialias/{m[1]}/edges:(\d+)")]
+            edges = [(self.get(e[0]), f"{e[2]} samples" + (", adaptive" if e[1] == "adaptive" else ""))
+                     for e in self.named(rf"antialias/{m[1]}/(edges|adaptive):(\d+)")]
             good = [e for e in edges if e[0].counters["dB"] >= uniform.counters["dB"]]
             if good:
                 best, samples = min(good, key=lambda e: e[0].cpu)
-                note = f"{best.counters['dB']:.1f} dB with {samples} samples, uniform {uniform.counters['dB']:.1f} dB"
+                note = f"{best.counters['dB']:.1f} dB with {samples}, uniform {uniform.counters['dB']:.1f} dB"
                 yield Row(m[1], [share(best.cpu / uniform.cpu, ("<=", 0.35)), Figure(note)])
             elif edges:
                 best, samples = max(edges, key=lambda e: e[0].counters["dB"])
-                note = (f"at most {best.counters['dB']:.1f} dB, with {samples} samples, in "
+                note = (f"at most {best.counters['dB']:.1f} dB, with {samples}, in "
                         f"{best.cpu / uniform.cpu:.2f} of the time; uniform {uniform.counters['dB']:.1f} dB")
                 yield Row(m[1], [Figure("none is as good", "", float("inf"), ("<=", 0.35)), Figure(note)])
 
