@@ -102,8 +102,8 @@ void add_contours(const Settings& settings) {
                                                       {"full", by<ContourMethod::full>},
                                                       {"exact", by<ContourMethod::exact>},
                                                       {"fast", by<ContourMethod::fast>}};
-    for (const SceneSpec& spec :
-         settings.quick ? scenes({"clutter", "assembly"}) : scenes({"clutter", "assembly", "engine", "body", "worm"}))
+    for (const SceneSpec& spec : settings.quick ? scenes({"crowd", "assembly"})
+                                                : scenes({"crowd", "clutter", "assembly", "engine", "body", "worm"}))
         for (const int targets : {1, 10, 100})
             for (const auto& [name, method] : methods)
                 add("contours/" + spec.name + '/' + std::to_string(targets) + '/' + name,

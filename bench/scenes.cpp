@@ -65,6 +65,31 @@ Scene clutter() {
     return std::move(b.scene);
 }
 
+/// A closed shell of 200,000 triangles around 500 parts of 5,000 and, six to each of those, 3,000 balls and
+/// wires about a pixel thick. Every seventh part is a large one.
+Scene crowd() {
+    test::Builder b(3);
+    const auto shell = std::uint32_t(b.scene.meshes.size()), fine = shell + 1;
+    b.scene.meshes.push_back(test::sphere(224));
+    b.scene.meshes.push_back(test::sphere(36));
+    b.add("shell", shell, {}, {2, 2, 2});
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> u(-1, 1);
+    const auto somewhere = [&] {
+        const double x = u(random), y = u(random), z = u(random);
+        return Vec3d{x, y, z};
+    };
+    for (int i = 0; i < 500; ++i) {
+        const std::string name = "part_" + std::to_string(i);
+        const double wide = 0.06 + 0.03 * std::abs(u(random)), high = 0.03 + 0.09 * std::abs(u(random));
+        b.add(name, fine, somewhere(), {wide, high, 0.07});
+        for (int k = 0; k < 4; ++k) b.add_sphere(name + "_ball", somewhere(), 0.002);
+        b.add_box(name + "_wire", somewhere(), {0.1, 0.001, 0.001});
+        b.add_box(name + "_wire", somewhere(), {0.001, 0.1, 0.001});
+    }
+    return std::move(b.scene);
+}
+
 std::string environment(const char* name) {
     const char* value = std::getenv(name);
     return value ? value : "";
@@ -75,6 +100,7 @@ std::vector<SceneSpec> known() {
             {"wires", "", wires, {}},
             {"balls", "", balls, {"ball1*"}},
             {"clutter", "", clutter, {"part_1*"}},
+            {"crowd", "", crowd, {"part_1*"}},
             {"assembly", environment("PORTHOLE_ASSEMBLY"), nullptr, {"part_00"}},
             {"assembly10x", environment("PORTHOLE_ASSEMBLY_10X"), nullptr, {"part_00"}},
             {"engine", shared_model("assembly/2CylinderEngine.glb"), nullptr, {"rod_123-699*"}},

@@ -22,7 +22,8 @@ struct SceneSpec {
     std::vector<std::string> targets; ///< selectors; empty: none
 };
 
-/// Those of `names` that are there, in that order. Procedural scenes always are: spheres, wires, balls, clutter.
+/// Those of `names` that are there, in that order. Procedural scenes always are: spheres, wires, balls, clutter,
+/// crowd.
 /// engine, house, mosquito, office, saw, body, worm and head are files below $PORTHOLE_SHARED/models; assembly and
 /// assembly10x are $PORTHOLE_ASSEMBLY and $PORTHOLE_ASSEMBLY_10X.
 [[nodiscard]] std::vector<SceneSpec> scenes(std::initializer_list<std::string_view> names);

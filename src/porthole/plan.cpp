@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "porthole/plan_steps.h"
-#include "porthole/trace/outline.h"
+#include "porthole/trace/coverage.h"
 
 namespace porthole {
 
@@ -30,14 +30,16 @@ TargetView view_target(const Subject& subject, const View& view, Rect window, Pa
         target.absent = true;
         return target;
     }
-    const IdBuffer ids = trace_ids_in_blocks(bvh, view, box, blocks, control, &rays);
+    const Coverage seen = cover(bvh, one, subject.boxes, view, window, Doubt::trace, control, &rays);
     const auto count = [&] {
         target.pixels_alone = target.pixels_outside = 0;
         for (int y = box.y0; y < box.y1; ++y)
             for (int x = box.x0; x < box.x1; ++x)
                 if (target.alone(x, y)) ++(view.window().contains(x, y) ? target.pixels_alone : target.pixels_outside);
     };
-    for (std::size_t i = 0; i < ids.id.pixels().size(); ++i) target.alone.pixels()[i] = ids.id.pixels()[i] == part;
+    const Rect in = seen.window.intersected(box);
+    for (int y = in.y0; y < in.y1; ++y)
+        for (int x = in.x0; x < in.x1; ++x) target.alone(x, y) = seen.hit(x, y);
     count();
     if (target.pixels_alone + target.pixels_outside >= kThinPixels) {
         target.absent = target.pixels_alone == 0;
@@ -181,29 +183,27 @@ CutawayMargins margins_of(const View& view, const PlanParams& params, const Hole
 
 /// Ids of the opened targets in windows.targets.
 IdBuffer target_ids(const Subject& subject, const Bvh& bvh, ContourMethod method, const Windows& windows,
-                    const BlockMask& blocks, ViewPlan& plan, const Control& control) {
+                    ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     std::int64_t& rays = plan.rays.targets;
     if (method == ContourMethod::full)
         return cropped(trace_ids(bvh, view, windows.all_targets, control, &rays), windows.targets);
-    if (method != ContourMethod::fast) return trace_ids_in_blocks(bvh, view, windows.targets, blocks, control, &rays);
-    const std::vector<Vec2i> seeds = outline_seeds(subject.scene(), plan.opened, view);
-    Outline outline = trace_outline(bvh, view, windows.targets, blocks, seeds, control);
-    trace_inferred(outline, bvh, view, control);
-    rays += outline.rays;
-    return std::move(outline.ids);
+    // Rays where there is something to hit.
+    const Doubt doubt = method == ContourMethod::fast ? Doubt::guess : Doubt::trace;
+    const Coverage seen = cover(bvh, plan.opened, subject.boxes, view, windows.all_targets, doubt, control, &rays);
+    return trace_ids_in_blocks(bvh, view, windows.targets, blocks_of(seen, windows.targets), control, &rays);
 }
 
 /// Everything of the plan that depends on which targets are opened.
 void plan_opened_group(const Subject& subject, const PlanParams& params, const HoleParams& band, const Windows& windows,
-                       const BlockMask& blocks, const IdBuffer* plain, ViewPlan& plan, const Control& control) {
+                       const IdBuffer* plain, ViewPlan& plan, const Control& control) {
     const View& view = plan.view;
     const bool all = plan.opened.size() == subject.targets.size();
     std::optional<Bvh> some;
     if (!all) some.emplace(build_bvh(*subject.meshes, plan.opened));
     const Bvh& bvh = all ? subject.target_bvh : *some;
 
-    IdBuffer ids = target_ids(subject, bvh, params.contours, windows, blocks, plan, control);
+    IdBuffer ids = target_ids(subject, bvh, params.contours, windows, plan, control);
     add_thin_targets(subject, view, plan.targets, plan.opened, ids, control, plan.rays.targets);
 
     PaperContours paper;
@@ -387,7 +387,7 @@ ViewPlan plan_view(const Subject& subject, const View& view, const PlanParams& p
     // A target that has no room is taken out of the group, and the rest is planned again:
     // what it covered may have become visible, what only it needed stays whole.
     for (;;) {
-        plan_opened_group(subject, params, band, windows, blocks, plain, plan, control);
+        plan_opened_group(subject, params, band, windows, plain, plan, control);
         if (params.tight == Tight::open || plan.ghost || plan.cut_set.empty()) return plan;
         std::vector<PartId> refused = no_room(plan, params);
         if (refused.empty()) return plan;

@@ -20,9 +20,9 @@
 namespace porthole {
 
 enum class ContourMethod : std::uint8_t {
-    exact, ///< targets traced in the blocks their boxes touch; equals `full` on every view
+    exact, ///< targets projected, rays only where rounding could matter; equals `full` on every view
     full,  ///< every pixel traced against the targets: the oracle
-    fast,  ///< the outline followed block by block, its inside traced: may miss what is small or thin
+    fast,  ///< targets projected, without those rays: a pixel whose centre is on an edge may be wrong
     paper  ///< contours followed as the paper does; targets that step 1 misses are missed
 };
 
@@ -149,13 +149,13 @@ struct ViewPlan {
 /// The targets' contours by themselves, as a picture in motion wants them.
 struct TargetContours {
     std::vector<Contour> contours; ///< the pixels are those of find_contours() of the target ids in the picture;
-                                   ///< chains may come in another order
+                                   ///< pieces at its edge may come in another order
     std::int64_t rays = 0;
 };
 
-/// Contours of all targets in the picture. Methods exact and fast work group by group of the
-/// blocks that the targets' boxes touch; fast infers what is inside the outline.
-/// Cost: fast, about seven rays a contour pixel; exact, one a pixel of the boxes.
+/// Contours of all targets in the picture. Methods exact and fast are those of cover(): rays decide, or
+/// guesses do.
+/// Cost: see cover(); full, one ray a pixel.
 [[nodiscard]] TargetContours find_target_contours(const Subject& subject, const View& view,
                                                   ContourMethod method = ContourMethod::exact,
                                                   const Control& control = {});

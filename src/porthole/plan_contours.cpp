@@ -1,5 +1,5 @@
 #include "porthole/plan.h"
-#include "porthole/trace/outline.h"
+#include "porthole/trace/coverage.h"
 
 namespace porthole {
 
@@ -17,22 +17,10 @@ TargetContours find_target_contours(const Subject& subject, const View& view, Co
         return found;
     }
 
-    const BlockMask all = mark_blocks(subject.scene(), subject.targets, subject.boxes, view, view.window());
-    const std::vector<Vec2i> seeds =
-        method == ContourMethod::fast ? outline_seeds(subject.scene(), subject.targets, view) : std::vector<Vec2i>{};
-    // Targets keep off the edge of their blocks, except at the picture's own.
-    for (const BlockMask& blocks : separate(all)) {
-        const Rect box = pixel_rect(blocks, view.window());
-        std::vector<Contour> contours;
-        if (method == ContourMethod::fast) {
-            const Outline outline = trace_outline(bvh, view, box, blocks, seeds, control);
-            found.rays += outline.rays;
-            contours = find_contours(outline.ids.id);
-        } else {
-            contours = find_contours(trace_ids_in_blocks(bvh, view, box, blocks, control, &found.rays).id);
-        }
-        std::move(contours.begin(), contours.end(), std::back_inserter(found.contours));
-    }
+    const Doubt doubt = method == ContourMethod::fast ? Doubt::guess : Doubt::trace;
+    const Coverage targets =
+        cover(bvh, subject.targets, subject.boxes, view, view.window(), doubt, control, &found.rays);
+    found.contours = find_contours(targets.hit, targets.window);
     return found;
 }
 

@@ -128,7 +128,7 @@ TEST_P(Models, ExactEqualsFullFromRandomDirections) {
     EXPECT_GT(opened, 0);
 }
 
-TEST_P(Models, FastContoursMissLittleAndAddNothing) {
+TEST_P(Models, FastContoursAreAlmostRight) {
     PORTHOLE_NEEDS_SHARED(shared);
     const Scene scene = load_scene((shared / "models" / GetParam().file).string());
     const MeshBvhs meshes = build_mesh_bvhs(scene);
@@ -142,7 +142,7 @@ TEST_P(Models, FastContoursMissLittleAndAddNothing) {
     };
     const auto before = [](Vec2i a, Vec2i b) { return a.y != b.y ? a.y < b.y : a.x < b.x; };
 
-    std::int64_t all = 0, missed = 0, full_rays = 0, exact_rays = 0, fast_rays = 0, ignored = 0;
+    std::int64_t all = 0, missed = 0, added = 0, full_rays = 0, exact_rays = 0, fast_rays = 0, ignored = 0;
     int k = 0;
     for (const Vec3f direction : random_directions(kDirections, 20261123)) {
         const View view = view_from_direction(framing, direction, {}, 640, 360);
@@ -152,9 +152,8 @@ TEST_P(Models, FastContoursMissLittleAndAddNothing) {
         ASSERT_EQ(pixels(view, ContourMethod::fast, 7, ignored), fast);
         std::vector<Vec2i> right;
         std::set_intersection(fast.begin(), fast.end(), full.begin(), full.end(), std::back_inserter(right), before);
-        // A border pixel beside one that was missed is the only way to find what is none.
-        EXPECT_LE(fast.size() - right.size(), full.size() - right.size());
         all += std::int64_t(full.size()), missed += std::int64_t(full.size() - right.size());
+        added += std::int64_t(fast.size() - right.size());
 
         // In a plan every id comes from a ray: what is there is right, what is missed is nothing.
         if (k > 4) continue;
@@ -169,10 +168,12 @@ TEST_P(Models, FastContoursMissLittleAndAddNothing) {
     }
     RecordProperty("contour_pixels", int(all));
     RecordProperty("missed", int(missed));
+    RecordProperty("added", int(added));
     RecordProperty("rays_full_exact_fast",
                    std::to_string(full_rays) + ' ' + std::to_string(exact_rays) + ' ' + std::to_string(fast_rays));
-    EXPECT_LT(fast_rays, exact_rays);
-    EXPECT_LE(double(missed), 0.02 * double(all));
+    EXPECT_LE(fast_rays, exact_rays);
+    EXPECT_LT(exact_rays, full_rays / 4);
+    EXPECT_LE(double(missed + added), 0.001 * double(all));
 }
 
 TEST_P(Models, ClearanceAgreesWithOpenCv) {

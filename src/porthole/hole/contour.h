@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "porthole/base/bits.h"
 #include "porthole/base/ids.h"
 
 namespace porthole {
@@ -33,6 +34,9 @@ struct Contour {
 ///
 ///   const std::vector<Contour> contours = find_contours(target_ids.id);
 [[nodiscard]] std::vector<Contour> find_contours(const Image<PartId>& target_ids);
+
+/// The same for `window` of the targets' pixels, which may have more around it.
+[[nodiscard]] std::vector<Contour> find_contours(const Bits& targets, Rect window);
 
 /// Contour pixels of `contours`, each once, in scan order.
 [[nodiscard]] std::vector<Vec2i> contour_pixels(std::span<const Contour> contours);

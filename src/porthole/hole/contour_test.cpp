@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <random>
 #include <tuple>
 
 #include "porthole/hole/test_pictures.h"
@@ -161,6 +162,44 @@ TEST(FindContours, AgreesWithOpenCv) {
         std::sort(found.begin(), found.end());
         ASSERT_EQ(found, expected) << "round " << round;
     }
+}
+
+TEST(FindContours, BitsAreFollowedLikeIds) {
+    std::mt19937 random(11);
+    for (const Rect window : {Rect{-13, -5, 190, 77}, Rect{0, 0, 64, 64}, Rect{3, 2, 4, 9}, Rect{-8, 0, 120, 40}})
+        for (const unsigned share : {2u, 9u, 40u}) {
+            // Rectangles, and around the window pixels that must not matter.
+            Bits bits({window.x0 & ~7, window.y0, window.x1, window.y1});
+            Image<PartId> ids(window, kNoPart);
+            for (int y = window.y0; y < window.y1; ++y)
+                for (int x = bits.window().x0; x < window.x1; ++x)
+                    if (x < window.x0 || random() % share == 0) {
+                        bits.set(x, x + 1, y);
+                        if (x >= window.x0) ids(x, y) = PartId{1};
+                    }
+            bits.set(Rect{window.x0, window.y0, (window.x0 + window.x1) / 2, (window.y0 + window.y1) / 2});
+            for (int y = window.y0; y < (window.y0 + window.y1) / 2; ++y)
+                for (int x = window.x0; x < (window.x0 + window.x1) / 2; ++x) ids(x, y) = PartId{2};
+            const std::vector<Contour> a = find_contours(ids), b = find_contours(bits, window);
+            ASSERT_EQ(a.size(), b.size());
+            for (std::size_t i = 0; i < a.size(); ++i) {
+                EXPECT_EQ(a[i].pixels, b[i].pixels);
+                EXPECT_EQ(a[i].outer, b[i].outer);
+                EXPECT_EQ(a[i].closed, b[i].closed);
+            }
+        }
+}
+
+TEST(Bits, WholeRectanglesAreFoundWhole) {
+    Bits bits({-16, -2, 301, 5});
+    const Rect set{-11, -1, 205, 4};
+    bits.set(set);
+    for (int x0 = -16; x0 < 301; x0 += 3)
+        for (int x1 = x0 + 1; x1 <= 301; x1 += 7)
+            EXPECT_EQ(bits.all({x0, 0, x1, 3}), x0 >= set.x0 && x1 <= set.x1) << x0 << ' ' << x1;
+    EXPECT_FALSE(bits.all({0, -2, 3, 1}));
+    for (int y = -2; y < 5; ++y)
+        for (int x = -16; x < 301; ++x) ASSERT_EQ(bits(x, y), set.contains(x, y));
 }
 
 TEST(FindContours, ChainsComeInScanOrderOfTheirFirstPixel) {

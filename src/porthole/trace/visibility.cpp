@@ -44,66 +44,6 @@ void add(std::int64_t* rays, const std::atomic<std::int64_t>& n) {
     if (rays) *rays += n.load();
 }
 
-/// Sixteen bits of a coordinate spread to every third bit.
-std::uint32_t spread(std::uint32_t v) {
-    v = (v | (v << 16)) & 0x030000FFu;
-    v = (v | (v << 8)) & 0x0300F00Fu;
-    v = (v | (v << 4)) & 0x030C30C3u;
-    return (v | (v << 2)) & 0x09249249u;
-}
-
-std::vector<Bounds3f> boxes_of(const Mesh& mesh) {
-    if (!mesh.primitives.empty()) return {mesh.bounds};
-    constexpr std::size_t kCluster = 64;
-    const std::size_t n = mesh.triangles.size();
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> order(n);
-    const Vec3f size = mesh.bounds.size();
-    const auto cell = [](float v, float lower, float extent) {
-        return extent > 0 ? std::uint32_t(std::clamp((v - lower) / extent, 0.0f, 1.0f) * 1023.0f) : 0u;
-    };
-    for (std::uint32_t i = 0; i < n; ++i) {
-        const Vec3u t = mesh.triangles[i];
-        const Vec3f c = mesh.positions[t.x] / 3.0f + mesh.positions[t.y] / 3.0f + mesh.positions[t.z] / 3.0f;
-        order[i] = {spread(cell(c.x, mesh.bounds.lower.x, size.x)) |
-                        spread(cell(c.y, mesh.bounds.lower.y, size.y)) << 1 |
-                        spread(cell(c.z, mesh.bounds.lower.z, size.z)) << 2,
-                    i};
-    }
-    std::sort(order.begin(), order.end());
-    std::vector<Bounds3f> boxes((n + kCluster - 1) / kCluster);
-    for (std::size_t k = 0; k < n; ++k) {
-        const Vec3u t = mesh.triangles[order[k].second];
-        for (const std::uint32_t v : {t.x, t.y, t.z}) boxes[k / kCluster].extend(mesh.positions[v]);
-    }
-    return boxes;
-}
-
-/// Pixel rectangle that a box covers, one pixel more on each side; empty when it lies behind
-/// the eye; `window` when it reaches the eye's plane and no finite rectangle bounds it.
-Rect projected_rect(const Bounds3f& box, const Affine3d& camera_from_mesh, const View& view, Rect window) {
-    double x0 = 1e300, y0 = 1e300, x1 = -1e300, y1 = -1e300;
-    double nearest = 1e300, farthest = -1e300;
-    Vec3d corners[8];
-    for (int i = 0; i < 8; ++i) {
-        corners[i] = camera_from_mesh.point(Vec3d(box.corner(i)));
-        nearest = std::min(nearest, -corners[i].z);
-        farthest = std::max(farthest, -corners[i].z);
-    }
-    const double scale = view.pixel_scale();
-    if (!view.orthographic) {
-        if (farthest < 0) return {};
-        if (!(nearest > 1e-4 * farthest)) return window;
-    }
-    for (const Vec3d& c : corners) {
-        const double s = 1.0 / (view.orthographic ? scale : scale * -c.z);
-        const double x = 0.5 * view.width + c.x * s, y = 0.5 * view.height - c.y * s;
-        x0 = std::min(x0, x), x1 = std::max(x1, x);
-        y0 = std::min(y0, y), y1 = std::max(y1, y);
-    }
-    const auto pixel = [](double v) { return int(std::clamp(std::floor(v), -1e9, 1e9)); };
-    return Rect{pixel(x0) - 1, pixel(y0) - 1, pixel(x1) + 2, pixel(y1) + 2}.intersected(window);
-}
-
 /// Ids of the marked blocks of `window`, of all of them without `blocks`.
 IdBuffer traced_ids(const Bvh& bvh, const View& view, Rect window, const BlockMask* blocks, const Control& control,
                     std::int64_t* rays) {
@@ -129,43 +69,6 @@ IdBuffer traced_ids(const Bvh& bvh, const View& view, Rect window, const BlockMa
 
 IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control& control, std::int64_t* rays) {
     return traced_ids(bvh, view, window, nullptr, control, rays);
-}
-
-ClusterBoxes cluster_boxes(const Scene& scene, std::span<const PartId> parts, const Control& control) {
-    ClusterBoxes boxes;
-    boxes.by_mesh.resize(scene.meshes.size());
-    std::vector<std::uint32_t> meshes;
-    for (const PartId id : parts) meshes.push_back(scene.parts[index(id)].mesh);
-    std::sort(meshes.begin(), meshes.end());
-    meshes.erase(std::unique(meshes.begin(), meshes.end()), meshes.end());
-    parallel_for(meshes.size(), control,
-                 [&](std::size_t i) { boxes.by_mesh[meshes[i]] = boxes_of(scene.meshes[meshes[i]]); });
-    return boxes;
-}
-
-std::int64_t BlockMask::count() const {
-    return std::count(marked.pixels().begin(), marked.pixels().end(), std::uint8_t{1});
-}
-
-BlockMask mark_blocks(const Scene& scene, std::span<const PartId> parts, const ClusterBoxes& boxes, const View& view,
-                      Rect window) {
-    BlockMask mask;
-    mask.blocks = {floor_div4(window.x0), floor_div4(window.y0), floor_div4(window.x1 - 1) + 1,
-                   floor_div4(window.y1 - 1) + 1};
-    mask.marked = Mask(mask.blocks, 0);
-    const Affine3d camera_from_world = inverse(Affine3d(view.world_from_camera));
-    for (const PartId id : parts) {
-        const Part& part = scene.parts[index(id)];
-        const Affine3d camera_from_mesh = camera_from_world * part.world_from_mesh;
-        for (const Bounds3f& box : boxes.by_mesh[part.mesh]) {
-            const Rect r = projected_rect(box, camera_from_mesh, view, window);
-            if (r.empty()) continue;
-            for (int by = floor_div4(r.y0); by <= floor_div4(r.y1 - 1); ++by)
-                std::fill_n(&mask.marked(floor_div4(r.x0), by), floor_div4(r.x1 - 1) - floor_div4(r.x0) + 1,
-                            std::uint8_t{1});
-        }
-    }
-    return mask;
 }
 
 IdBuffer trace_ids_in_blocks(const Bvh& bvh, const View& view, Rect window, const BlockMask& blocks,

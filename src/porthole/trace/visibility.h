@@ -8,6 +8,7 @@
 
 #include "porthole/base/cut.h"
 #include "porthole/trace/bvh.h"
+#include "porthole/trace/clusters.h"
 
 namespace porthole {
 
@@ -16,27 +17,6 @@ namespace porthole {
 /// Cost: one coherent ray a pixel.
 [[nodiscard]] IdBuffer trace_ids(const Bvh& bvh, const View& view, Rect window, const Control& control = {},
                                  std::int64_t* rays = nullptr);
-
-/// Boxes around runs of about 64 neighbouring triangles, mesh coordinates, by mesh index.
-struct ClusterBoxes {
-    std::vector<std::vector<Bounds3f>> by_mesh;
-};
-
-/// Boxes for the meshes of `parts`; other meshes get none. Triangles are grouped along a
-/// Morton curve of their centroids; a mesh of primitives has one box. Cost: a sort of the parts' triangles.
-[[nodiscard]] ClusterBoxes cluster_boxes(const Scene& scene, std::span<const PartId> parts,
-                                         const Control& control = {});
-
-/// 4x4-pixel blocks of `window`, aligned to multiples of 4 in absolute pixels, that the
-/// projected boxes of `parts` touch: near-clipped, rounded outward, one pixel more. A block
-/// that is not marked cannot hold a pixel whose ray hits one of the parts.
-struct BlockMask {
-    Rect blocks; ///< in block coordinates (pixel / 4, rounded down)
-    Mask marked; ///< window = blocks
-    [[nodiscard]] std::int64_t count() const;
-};
-[[nodiscard]] BlockMask mark_blocks(const Scene& scene, std::span<const PartId> parts, const ClusterBoxes& boxes,
-                                    const View& view, Rect window);
 
 /// trace_ids over the marked blocks only; kNoPart elsewhere. With the blocks of `bvh`'s own
 /// parts it equals trace_ids(bvh, view, window) on every pixel, by construction.
