@@ -41,7 +41,7 @@ enum class Encoding : std::uint8_t {
 /// the images' memory in all. A texel is the mean of those it covers, as light where a material uses
 /// the image as colour; colours under no alpha do not count where alpha hides them.
 /// load_scene() calls it, so that a loaded scene never changes. Without them images are not filtered.
-/// @throws Cancelled. Cost: some 15 ns a texel, images side by side.
+/// @throws Cancelled. Cost: 7 ns a texel, 9 of colours, images side by side.
 void build_mips(Scene& scene, const Control& control = {});
 
 /// The part of a surface that one sample stands for: the axes of an ellipse, in barycentric (u, v) of
