@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "porthole/render/restyle.h"
+#include "porthole/render/test_frame.h"
 #include "porthole/render/test_scene.h"
 #include "porthole/render/wireframe.h"
 #include "porthole/trace/visibility.h"
@@ -17,9 +17,8 @@ using test::box_mesh;
 using test::look_at;
 using test::matte;
 using test::quad_mesh;
+using test::same_color;
 using test::sphere_mesh;
-
-bool same_color(Vec4f a, Vec4f b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 /// A line on the picture.
 struct Segment {
