@@ -28,7 +28,8 @@ void add_antialias(const Settings& settings);
 void add_contours(const Settings& settings);
 
 /// cut/SCENE/{plan,plain,cutaway,absent,hole_capped,hole_uncapped}: `absent` is `cutaway` of a scene from which
-/// the removed geometry is truly gone.
+/// the removed geometry is truly gone. The last four also as ..._one_sample: one sample a pixel and no lines, so
+/// that both sides of a ratio draw as much; by default a hole has twice the samples, and lines at its caps.
 void add_cut(const Settings& settings);
 
 /// threads/SCENE/{frame,reveal}/{1,2}: wall time on one thread and on two.

@@ -36,36 +36,45 @@ void plain(benchmark::State& state, const SceneSpec& spec) {
         benchmark::DoNotOptimize(render(c.cut.subject->whole, nullptr, c.cut.view, {}, nullptr, nullptr, one_thread()));
 }
 
-void cutaway(benchmark::State& state, const SceneSpec& spec) {
+/// The same work in every picture: a hole has more samples than what is around it, and lines.
+RenderParams one_sample() { return {.samples = 1, .lines = Lines::none}; }
+
+void cutaway(benchmark::State& state, const SceneSpec& spec, const RenderParams& params) {
     const CutStage& c = cut_stage(spec);
-    for (auto _ : state) benchmark::DoNotOptimize(c.cut.draw(true, {}, one_thread()));
+    for (auto _ : state) benchmark::DoNotOptimize(c.cut.draw(true, params, one_thread()));
 }
 
 /// The yardstick of cutaway(): the removed geometry is truly absent.
-void absent(benchmark::State& state, const SceneSpec& spec) {
+void absent(benchmark::State& state, const SceneSpec& spec, const RenderParams& params) {
     const CutStage& c = cut_stage(spec);
     for (auto _ : state)
-        benchmark::DoNotOptimize(render(*c.absent.bvh, nullptr, c.cut.view, {}, nullptr, nullptr, one_thread()));
+        benchmark::DoNotOptimize(render(*c.absent.bvh, nullptr, c.cut.view, params, nullptr, nullptr, one_thread()));
 }
 
-void hole(benchmark::State& state, const SceneSpec& spec, bool capped) {
+void hole(benchmark::State& state, const SceneSpec& spec, bool capped, const RenderParams& params) {
     const CutStage& c = cut_stage(spec);
-    for (auto _ : state) benchmark::DoNotOptimize(c.cut.draw_hole(capped, {}, c.around, one_thread()));
+    for (auto _ : state) benchmark::DoNotOptimize(c.cut.draw_hole(capped, params, c.around, one_thread()));
 }
 
 } // namespace
 
 void add_cut(const Settings& settings) {
     for (const SceneSpec& spec : settings.quick ? scenes({"balls"}) : scenes({"balls", "assembly", "engine", "body"})) {
-        const auto add_part = [&](const char* what, auto function) {
+        const auto add_part = [&](const std::string& what, auto function) {
             add("cut/" + spec.name + '/' + what, [=](benchmark::State& state) { function(state, spec); });
         };
         add_part("plan", plan);
         add_part("plain", plain);
-        add_part("cutaway", cutaway);
-        add_part("absent", absent);
-        add_part("hole_capped", [](benchmark::State& s, const SceneSpec& c) { hole(s, c, true); });
-        add_part("hole_uncapped", [](benchmark::State& s, const SceneSpec& c) { hole(s, c, false); });
+        for (const bool one : {false, true}) {
+            const RenderParams params = one ? one_sample() : RenderParams{};
+            const auto add_look = [&](const std::string& what, auto function) {
+                add_part(one ? what + "_one_sample" : what, function);
+            };
+            add_look("cutaway", [=](benchmark::State& s, const SceneSpec& c) { cutaway(s, c, params); });
+            add_look("absent", [=](benchmark::State& s, const SceneSpec& c) { absent(s, c, params); });
+            add_look("hole_capped", [=](benchmark::State& s, const SceneSpec& c) { hole(s, c, true, params); });
+            add_look("hole_uncapped", [=](benchmark::State& s, const SceneSpec& c) { hole(s, c, false, params); });
+        }
     }
 }
 

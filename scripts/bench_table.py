@@ -137,14 +137,15 @@ class Table:
             yield Row(f"{scene}, {count} target{'s' if count != '1' else ''}, {method}", figures)
 
     def cut(self):
-        for m in self.named(r"cut/(\w+)/cutaway"):
-            if absent := self.get(f"cut/{m[1]}/absent"):
-                yield Row(f"{m[1]}: a cutaway, against the removed geometry truly absent",
-                          [times(self.get(m[0]).cpu / absent.cpu, ("<=", 1.15))])
-        for m in self.named(r"cut/(\w+)/hole_capped"):
-            if uncapped := self.get(f"cut/{m[1]}/hole_uncapped"):
-                yield Row(f"{m[1]}: the hole with caps, against without",
-                          [times(self.get(m[0]).cpu / uncapped.cpu, ("<=", 1.1))])
+        looks = (("", ""), ("_one_sample", ", both with one sample a pixel and no lines"))
+        for thing, yardstick, text, bar in (
+            ("cutaway", "absent", "a cutaway, against the removed geometry truly absent", 1.15),
+            ("hole_capped", "hole_uncapped", "the hole with caps, against without", 1.1),
+        ):
+            for suffix, look in looks:
+                for m in self.named(rf"cut/(\w+)/{thing}{suffix}"):
+                    if by := self.get(f"cut/{m[1]}/{yardstick}{suffix}"):
+                        yield Row(f"{m[1]}: {text}{look}", [times(self.get(m[0]).cpu / by.cpu, ("<=", bar))])
 
     def jobs(self):
         bars = {"assembly": (("<=", 1.2), 0.8), "assembly10x": (("<=", 6), 4)}

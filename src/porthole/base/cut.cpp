@@ -16,7 +16,7 @@ float Cut::distance_at(float x, float y) const {
     }
     const int ix = int(fx), iy = int(fy);
     const float ax = gx - fx, ay = gy - fy;
-    // At a grid point this is that pixel's value exactly: the other weights are zero.
+    if (ax == 0 && ay == 0) return distance(ix, iy);
     const float top = distance(ix, iy) * (1 - ax) + distance(ix + 1, iy) * ax;
     const float bottom = distance(ix, iy + 1) * (1 - ax) + distance(ix + 1, iy + 1) * ax;
     return top * (1 - ay) + bottom * ay;
@@ -56,6 +56,8 @@ CutDepth Cut::depth_at(float x, float y, std::size_t which) const {
     const float fx = std::floor(gx), fy = std::floor(gy);
     const int ix = int(fx), iy = int(fy);
     const float ax = gx - fx, ay = gy - fy;
+    if (ax == 0 && ay == 0 && profiles.contains(ix, iy) && profiles(ix, iy).floor > -kInfinity)
+        return result(profiles(ix, iy));
     const float weights[4] = {(1 - ax) * (1 - ay), ax * (1 - ay), (1 - ax) * ay, ax * ay};
     CutProfile mean{0, 0, 0, 0, 0};
     float sum = 0, front_sum = 0, nearest_floor = kInfinity, farthest_floor = -kInfinity;

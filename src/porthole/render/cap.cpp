@@ -36,17 +36,16 @@ float hatch_coverage(Vec2f at, PartId part, int picture_height) {
 
 SurfacePoint cap_point(const Cut& cut, std::size_t level, float x, float y, float depth) {
     const View& view = cut.view;
-    const auto at = [&](float px, float py, float z) {
-        const Ray ray = view.ray(px, py);
-        return ray.origin + ray.direction * (z / ray.depth_per_t);
-    };
+    const auto along = [](const Ray& ray, float z) { return ray.origin + ray.direction * (z / ray.depth_per_t); };
+    const auto at = [&](float px, float py, float z) { return along(view.ray(px, py), z); };
     SurfacePoint point;
-    point.position = at(x, y, depth);
-    const Vec3f to_eye = -view.ray(x, y).direction;
+    const Ray seen = view.ray(x, y);
+    point.position = along(seen, depth);
+    const Vec3f to_eye = -seen.direction;
     const CutDepth own = cut.depth_at(x, y, level);
     // The slope along one axis of the picture: from both sides if the surface goes on there.
     float bend = 0; // how far the surface leaves its tangent plane within a pixel, metres
-    const auto slope = [&](float dx, float dy, Vec3f& along) {
+    const auto slope = [&](float dx, float dy, Vec3f& step) {
         const auto joined = [&](float sign, float& z) {
             const float px = x + sign * dx, py = y + sign * dy;
             if (cut.distance_at(px, py) > 0) return false;
@@ -60,8 +59,8 @@ SurfacePoint cap_point(const Cut& cut, std::size_t level, float x, float y, floa
         if (!has_before && !has_after) return false;
         if (has_before && has_after)
             bend = std::max(bend, 2 * std::abs(before - 2 * depth + after) / std::max(1.0f, dx + dy));
-        along = (has_after ? at(x + dx, y + dy, after) : point.position) -
-                (has_before ? at(x - dx, y - dy, before) : point.position);
+        step = (has_after ? at(x + dx, y + dy, after) : point.position) -
+               (has_before ? at(x - dx, y - dy, before) : point.position);
         return true;
     };
     Vec3f right, down;

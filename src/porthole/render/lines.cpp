@@ -80,13 +80,16 @@ public:
         : view_(view), trace_(trace), rules_(rules), tile_(tile), reach_(reach_of(rules)),
           coarse_(tile.grown(reach_ + 2)), fine_{2 * coarse_.x0, 2 * coarse_.y0, 2 * coarse_.x1 + 1,
                                                  2 * coarse_.y1 + 1},
-          slot_(fine_, kNotTraced), close_(tile.grown(reach_)), caps_only_(rules.caps_only()) {}
+          slot_(fine_, kNotTraced), close_(tile.grown(reach_)), busy_{fine_.x1, fine_.y1, fine_.x0, fine_.y0},
+          caps_only_(rules.caps_only()) {}
 
     void run(const std::function<bool(int, int)>& inside, LineInk& ink) {
         look_at_pixels(inside);
         if (!find_suspects()) return;
         look_closely(inside);
-        across_ = down_ = Image<LinePoint>(fine_);
+        // Links end a point off the pixels that are looked at closely, their cells one further.
+        busy_ = busy_.grown(2).intersected(fine_);
+        across_ = down_ = Image<LinePoint>(busy_);
         find_crossings();
         thin_out();
         join(ink);
@@ -145,6 +148,8 @@ private:
             if (x + dx >= r.x1 || y + dy >= r.y1 || !known(i, j) || !known(k, l)) return;
             if (!may_be_line(sample(i, j), sample(k, l))) return;
             any = true;
+            busy_ = {std::min(busy_.x0, 2 * (x - 1)), std::min(busy_.y0, 2 * (y - 1)),
+                     std::max(busy_.x1, 2 * (x + dx + 2) + 1), std::max(busy_.y1, 2 * (y + dy + 2) + 1)};
             for (int v = y - 1; v <= y + dy + 1; ++v)
                 for (int u = x - 1; u <= x + dx + 1; ++u)
                     if (close_.contains(u, v)) close_(u, v) = 1;
@@ -189,10 +194,10 @@ private:
             links.push_back(
                 {{i, j}, is_across, a, b, 0, 1, same_thing(a, b) && a.part != kNoPart ? crease_strength(a, b) : 0.0f});
         };
-        for (int j = fine_.y0; j < fine_.y1; ++j)
-            for (int i = fine_.x0; i < fine_.x1; ++i) {
-                if (i + 1 < fine_.x1) add(i, j, true);
-                if (j + 1 < fine_.y1) add(i, j, false);
+        for (int j = busy_.y0; j < busy_.y1; ++j)
+            for (int i = busy_.x0; i < busy_.x1; ++i) {
+                if (i + 1 < busy_.x1) add(i, j, true);
+                if (j + 1 < busy_.y1) add(i, j, false);
             }
         for (std::size_t begin = 0; begin < links.size(); begin += kLanes) {
             const std::size_t n = std::min<std::size_t>(kLanes, links.size() - begin);
@@ -265,12 +270,12 @@ private:
 
     /// Fades lines where they crowd.
     void thin_out() {
-        Image<std::uint8_t> count(fine_);
-        for (int j = fine_.y0; j < fine_.y1; ++j)
-            for (int i = fine_.x0; i < fine_.x1; ++i)
+        Image<std::uint8_t> count(busy_);
+        for (int j = busy_.y0; j < busy_.y1; ++j)
+            for (int i = busy_.x0; i < busy_.x1; ++i)
                 count(i, j) = std::uint8_t((across_(i, j).found ? 1 : 0) + (down_(i, j).found ? 1 : 0));
-        for (int j = fine_.y0; j < fine_.y1; ++j)
-            for (int i = fine_.x0; i < fine_.x1; ++i) {
+        for (int j = busy_.y0; j < busy_.y1; ++j)
+            for (int i = busy_.x0; i < busy_.x1; ++i) {
                 if (count(i, j) == 0) continue;
                 int crowd = 0;
                 for (int v = j - kCrowd; v <= j + kCrowd; ++v)
@@ -286,8 +291,8 @@ private:
 
     /// Joins the crossings of every cell.
     void join(LineInk& ink) const {
-        for (int j = fine_.y0; j + 1 < fine_.y1; ++j)
-            for (int i = fine_.x0; i + 1 < fine_.x1; ++i) {
+        for (int j = busy_.y0; j + 1 < busy_.y1; ++j)
+            for (int i = busy_.x0; i + 1 < busy_.x1; ++i) {
                 const LinePoint* on[4];
                 std::size_t n = 0;
                 for (const LinePoint* c : {&across_(i, j), &across_(i, j + 1), &down_(i, j), &down_(i + 1, j)})
@@ -332,7 +337,8 @@ private:
     static constexpr std::int32_t kNotTraced = -1;
     Image<std::int32_t> slot_; ///< of a lattice point in samples_
     std::vector<LineSample> samples_;
-    Mask close_;
+    Mask close_; ///< pixels to look at closely
+    Rect busy_;  ///< lattice points of these
     bool caps_only_;
     Image<LinePoint> across_, down_; ///< on the link to the right and below
 };

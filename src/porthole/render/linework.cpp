@@ -69,6 +69,48 @@ Mask pixels_near_caps(const Picture& picture, Rect tile, float half_width) {
     return widened(caps, kNear);
 }
 
+/// What is hit at a position of the picture, as lines see it.
+void show(const Camera& camera, const std::vector<Placement>& placements, const Hit& hit, Vec2f at, float depth,
+          Vec3f direction, LineSample& s) {
+    if (!hit.any()) return;
+    const SurfacePoint point = camera.surface(placements, hit, at.x, at.y, depth, direction);
+    s.part = hit.part;
+    s.cap = hit.cap;
+    s.depth = depth;
+    s.position = point.position;
+    s.normal = point.normal;
+    s.flat_normal = point.flat_normal;
+}
+
+/// What the first pass saw at pixel centres, told again without a ray.
+class SeenBefore {
+public:
+    SeenBefore(const Picture& picture, const std::vector<Placement>& placements)
+        : picture_(picture), placements_(placements), any_(!is_selective(picture.params.refine)) {}
+
+    /// False if it did not look at (x, y).
+    [[nodiscard]] bool tell(float x, float y, LineSample& s) const {
+        const int px = int(std::floor(x)), py = int(std::floor(y));
+        if (!any_ || x != float(px) + 0.5f || y != float(py) + 0.5f) return false;
+        const GBuffer& buffer = picture_.buffer;
+        if (!buffer.pixels.contains(px, py)) return false;
+        const Pixel& pixel = buffer.pixels(px, py);
+        // What is wanted for its id alone has no surface.
+        if (!pixel.has(Pixel::traced) || (!picture_.inferred.empty() && picture_.inferred(px, py))) return false;
+        s = {};
+        s.in_hole = pixel.has(Pixel::in_hole);
+        s.on_target = pixel.has(Pixel::on_target);
+        show(picture_.camera, placements_, buffer.hit(px, py), {x, y}, buffer.ids.depth(px, py),
+             picture_.view.ray(x, y).direction, s);
+        return true;
+    }
+
+private:
+    const Picture& picture_;
+    const std::vector<Placement>& placements_;
+    bool any_; ///< the paper's ways do not look at all pixels they mark
+};
+
 } // namespace
 
 Seen16 look(const Camera& camera, Samples16 samples, RayCounts& rays) {
@@ -83,20 +125,11 @@ LineTrace camera_trace(const Camera& camera, const std::vector<Placement>& place
         const Seen16 seen = look(camera, samples, rays);
         for (int i = 0; i < kLanes; ++i) {
             if (!samples.active[i]) continue;
-            LineSample& s = out[i];
-            s = {};
-            s.in_hole = seen.in_hole[i];
-            s.on_target = seen.on_target[i];
-            const Hit& hit = seen.hit[i];
-            if (!hit.any()) continue;
-            const SurfacePoint point =
-                camera.surface(placements, hit, samples.x[i], samples.y[i], seen.depth[i], seen.direction[i]);
-            s.part = hit.part;
-            s.cap = hit.cap;
-            s.depth = seen.depth[i];
-            s.position = point.position;
-            s.normal = point.normal;
-            s.flat_normal = point.flat_normal;
+            out[i] = {};
+            out[i].in_hole = seen.in_hole[i];
+            out[i].on_target = seen.on_target[i];
+            show(camera, placements, seen.hit[i], {samples.x[i], samples.y[i]}, seen.depth[i], seen.direction[i],
+                 out[i]);
         }
     };
 }
@@ -173,8 +206,15 @@ void draw_lines(Picture& picture, const Stage& stage, const RimLine& rim, Rect t
     const bool caps = stage.cut && picture.params.shading != Shading::flat && picture.params.rim_px > 0;
     RayCounts rays;
     const LineTrace seen_by_camera = camera_trace(picture.camera, stage.placements, rays);
+    const SeenBefore before(picture, stage.placements);
     const LineTrace trace = [&](const Samples16& samples, LineSample* out) {
-        seen_by_camera(samples, out);
+        Samples16 unseen = samples;
+        bool any = false;
+        for (int i = 0; i < kLanes; ++i) {
+            unseen.active[i] = samples.active[i] && !before.tell(samples.x[i], samples.y[i], out[i]);
+            any |= unseen.active[i];
+        }
+        if (any) seen_by_camera(unseen, out);
         for (int i = 0; i < kLanes; ++i)
             if (samples.active[i]) out[i].outer = rim.outer(samples.x[i], samples.y[i], out[i]);
     };

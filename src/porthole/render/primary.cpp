@@ -1,6 +1,7 @@
 #include "porthole/render/primary.h"
 
 #include "porthole/render/cap.h"
+#include "porthole/trace/packet.h"
 
 namespace porthole {
 
@@ -41,19 +42,17 @@ Seen16 Camera::trace(const Samples16& samples, RayCounts& rays) const {
     }
     RayHit16 packet;
     float depth_per_t[kLanes];
+    set_rays(packet, depth_per_t, *view_, samples.x, samples.y);
     for (int i = 0; i < kLanes; ++i) {
         if (!samples.active[i]) {
             packet.clear(i);
             continue;
         }
-        const Ray ray = view_->ray(samples.x[i], samples.y[i]);
-        packet.set(i, ray.origin, ray.direction, 0, kInfinity);
-        depth_per_t[i] = ray.depth_per_t;
-        seen.origin[i] = ray.origin;
-        seen.direction[i] = ray.direction;
+        seen.origin[i] = packet.origin(i);
+        seen.direction[i] = packet.direction(i);
     }
     if (any_open && cut_ && !cut_->empty()) {
-        trace_open(samples, seen, plain, rays);
+        trace_open(samples, depth_per_t, seen, plain, rays);
         bool left = false;
         for (int i = 0; i < kLanes; ++i) {
             if (samples.active[i] && !plain[i]) packet.clear(i);
@@ -72,8 +71,8 @@ Seen16 Camera::trace(const Samples16& samples, RayCounts& rays) const {
     return seen;
 }
 
-void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const {
-    float depth_per_t[kLanes] = {};
+void Camera::trace_open(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
+                        bool (&plain)[kLanes], RayCounts& rays) const {
     float target_depth[kLanes];
     for (float& d : target_depth) d = kInfinity;
     if (targets_ && !targets_->empty()) {
@@ -88,7 +87,6 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         for (int i = 0; i < kLanes; ++i) {
             if (!samples.active[i] || !samples.may_open[i]) continue;
             ++rays.primary;
-            depth_per_t[i] = view_->ray(samples.x[i], samples.y[i]).depth_per_t;
             if (!packet.hit(i)) continue;
             target_depth[i] = packet.tfar[i] * depth_per_t[i];
             store_hit(packet, i, target_depth[i], seen);
@@ -104,27 +102,38 @@ void Camera::trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kL
         seen.in_hole[i] = seen.on_target[i] || cut_->distance_at(x, y) <= 0;
         if (!seen.in_hole[i]) continue;
         plain[i] = false;
-        depth_per_t[i] = view_->ray(x, y).depth_per_t;
-        const auto start = [&](float depth) { return std::max(0.0f, depth) / depth_per_t[i]; };
         kept[i] = 0;
-        loose[i] = start(cut_->loose_depth_at(x, y));
+        if (has_loose_) loose[i] = std::max(0.0f, cut_->loose_depth_at(x, y)) / depth_per_t[i];
         // Behind a target the cut set cannot be seen, in front of it nothing is left of it.
         // What lies on the target counts as behind it.
         if (seen.on_target[i]) seen.depth[i] = target_depth[i] - std::max(tolerance_, rounding(target_depth[i]));
     }
     // Where the underside of a cut wall lies on the floor it stood on, the floor is seen.
     if (has_kept_) trace_role(kMaskFixed, kept, depth_per_t, 0, seen, rays);
-    if (has_loose_) trace_role(kMaskLoose, loose, depth_per_t, 0, seen, rays);
-    if (has_cut_set_) trace_levels(samples, depth_per_t, seen, rays);
+    LevelLanes levels;
+    if (has_cut_set_) find_levels(samples, depth_per_t, seen, levels);
+    if (has_loose_) {
+        // What lies clearly behind a cap is not seen.
+        float end[kLanes];
+        for (int i = 0; i < kLanes; ++i) {
+            end[i] = kInfinity;
+            for (std::size_t k = 0; has_cut_set_ && k < cut_->levels.size(); ++k)
+                if (levels.is_capped(k, i))
+                    end[i] =
+                        std::min(end[i], levels.depth[k][i] + 4 * std::max(tolerance_, rounding(levels.depth[k][i])));
+        }
+        trace_role(kMaskLoose, loose, depth_per_t, 0, seen, rays, end);
+    }
+    for (std::size_t k = 0; has_cut_set_ && k < cut_->levels.size(); ++k)
+        trace_level(k, levels, depth_per_t, seen, rays);
     for (int i = 0; i < kLanes; ++i)
         if (seen.on_target[i]) seen.depth[i] = target_depth[i];
 }
 
-void Camera::trace_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
-                          RayCounts& rays) const {
+void Camera::find_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], const Seen16& seen,
+                         LevelLanes& found) const {
     const std::size_t levels = cut_->levels.size();
-    CutLanes lanes;
-    float depths[kMostLevels][kLanes];
+    CutLanes& lanes = found.cut;
     RayHit16 packet;
     for (int i = 0; i < kLanes; ++i) {
         for (std::size_t k = 0; k < levels; ++k) lanes.t[k][i] = kInfinity;
@@ -135,45 +144,44 @@ void Camera::trace_levels(const Samples16& samples, const float (&depth_per_t)[k
         packet.set(i, seen.origin[i], seen.direction[i], 0, kInfinity);
         for (std::size_t k = 0; k < levels; ++k) {
             const CutDepth cut = cut_->depth_at(samples.x[i], samples.y[i], k);
-            depths[k][i] = cut.depth;
+            found.depth[k][i] = cut.depth;
             lanes.t[k][i] = std::max(0.0f, cut.depth) / depth_per_t[i];
             lanes.chamfer[k][i] = cut.chamfer;
         }
     }
-    CapLanes capped;
-    if (caps_) {
-        // Between pixels whose caps differ every sample has to find its own.
-        bool asks[kLanes], any = false;
-        for (int i = 0; i < kLanes; ++i) {
-            const int x = int(std::floor(samples.x[i])), y = int(std::floor(samples.y[i]));
-            asks[i] = false;
-            for (std::size_t k = 0; k < levels; ++k) {
-                if (!(lanes.t[k][i] < kInfinity)) continue;
-                asks[i] |= !samples.at_centres && !caps_->is_even(k, x, y);
-                capped.cap[k][i] = caps_->at(k, x, y);
-            }
-            any |= asks[i];
-            if (!asks[i]) packet.clear(i);
+    if (!caps_) return;
+    // Between pixels whose caps differ every sample has to find its own.
+    bool asks[kLanes], any = false;
+    for (int i = 0; i < kLanes; ++i) {
+        const int x = int(std::floor(samples.x[i])), y = int(std::floor(samples.y[i]));
+        asks[i] = false;
+        for (std::size_t k = 0; k < levels; ++k) {
+            if (!(lanes.t[k][i] < kInfinity)) continue;
+            asks[i] |= !samples.at_centres && !caps_->is_even(k, x, y);
+            found.caps.cap[k][i] = caps_->at(k, x, y);
         }
-        if (any) {
-            const CapLanes found = find_caps(*bvh_, *cut_, *caps_, packet, lanes);
-            for (int i = 0; i < kLanes; ++i)
-                for (std::size_t k = 0; k < levels && asks[i]; ++k) capped.cap[k][i] = found.cap[k][i];
-        }
+        any |= asks[i];
+        if (!asks[i]) packet.clear(i);
     }
-    for (std::size_t k = 0; k < levels; ++k) {
-        for (int i = 0; i < kLanes; ++i) {
-            const SurfaceRef& cap = capped.cap[k][i];
-            if (cap.part == kNoPart || !(lanes.t[k][i] < kInfinity)) continue;
-            // Nothing of the level can be nearer than its own cut.
-            lanes.t[k][i] = kInfinity;
-            const float depth = depths[k][i];
-            if (!(depth < seen.depth[i] - std::max(tolerance_, rounding(depth)))) continue;
-            seen.hit[i] = {cap.part, cap.triangle, cap.u, cap.v, true};
-            seen.depth[i] = depth;
-        }
-        trace_role(level_mask(k), lanes.t[k], depth_per_t, tolerance_, seen, rays);
+    if (!any) return;
+    const CapLanes own = find_caps(*bvh_, *cut_, *caps_, packet, lanes);
+    for (int i = 0; i < kLanes; ++i)
+        for (std::size_t k = 0; k < levels && asks[i]; ++k) found.caps.cap[k][i] = own.cap[k][i];
+}
+
+void Camera::trace_level(std::size_t k, LevelLanes& levels, const float (&depth_per_t)[kLanes], Seen16& seen,
+                         RayCounts& rays) const {
+    for (int i = 0; i < kLanes; ++i) {
+        if (!levels.is_capped(k, i)) continue;
+        const SurfaceRef& cap = levels.caps.cap[k][i];
+        // Nothing of the level can be nearer than its own cut.
+        levels.cut.t[k][i] = kInfinity;
+        const float depth = levels.depth[k][i];
+        if (!(depth < seen.depth[i] - std::max(tolerance_, rounding(depth)))) continue;
+        seen.hit[i] = {cap.part, cap.triangle, cap.u, cap.v, true};
+        seen.depth[i] = depth;
     }
+    trace_role(level_mask(k), levels.cut.t[k], depth_per_t, tolerance_, seen, rays);
 }
 
 SurfacePoint Camera::surface(const std::vector<Placement>& placements, const Hit& hit, float x, float y, float depth,
@@ -183,13 +191,14 @@ SurfacePoint Camera::surface(const std::vector<Placement>& placements, const Hit
 }
 
 void Camera::trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],
-                        float tolerance, Seen16& seen, RayCounts& rays) const {
+                        float tolerance, Seen16& seen, RayCounts& rays, const float* end) const {
     RayHit16 packet;
     bool any = false;
     for (int i = 0; i < kLanes; ++i) {
         if (tnear[i] < kInfinity) {
             // Beyond what is seen already nothing matters.
-            packet.set(i, seen.origin[i], seen.direction[i], tnear[i], seen.depth[i] / depth_per_t[i], mask);
+            const float until = end ? std::min(end[i], seen.depth[i]) : seen.depth[i];
+            packet.set(i, seen.origin[i], seen.direction[i], tnear[i], until / depth_per_t[i], mask);
             any |= packet.active(i);
         } else {
             packet.clear(i);

@@ -43,12 +43,24 @@ public:
     [[nodiscard]] const Cut* cut() const { return cut_; }
 
 private:
-    void trace_open(const Samples16& samples, Seen16& seen, bool (&plain)[kLanes], RayCounts& rays) const;
+    void trace_open(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen, bool (&plain)[kLanes],
+                    RayCounts& rays) const;
     void trace_role(std::uint32_t mask, const float (&tnear)[kLanes], const float (&depth_per_t)[kLanes],
-                    float tolerance, Seen16& seen, RayCounts& rays) const;
+                    float tolerance, Seen16& seen, RayCounts& rays, const float* end = nullptr) const;
 
-    void trace_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], Seen16& seen,
-                      RayCounts& rays) const;
+    /// Where rays meet the cut surface of each level, and what of it is capped.
+    struct LevelLanes {
+        CutLanes cut;
+        CapLanes caps;
+        float depth[kMostLevels][kLanes]; ///< metres along camera -z
+        [[nodiscard]] bool is_capped(std::size_t level, int lane) const {
+            return cut.t[level][lane] < kInfinity && caps.cap[level][lane].part != kNoPart;
+        }
+    };
+    void find_levels(const Samples16& samples, const float (&depth_per_t)[kLanes], const Seen16& seen,
+                     LevelLanes& found) const;
+    void trace_level(std::size_t k, LevelLanes& levels, const float (&depth_per_t)[kLanes], Seen16& seen,
+                     RayCounts& rays) const;
 
     const Bvh* bvh_;
     const Bvh* targets_;

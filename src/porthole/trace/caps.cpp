@@ -66,18 +66,35 @@ void drop_unbalanced(const Scene& scene, std::span<const MeshSolid> solids, std:
     });
 }
 
-/// Passages of the active lanes up to their tfar; to their end if parts are doubtful.
+/// Passages of the active lanes up to their tfar; to their end if they pass doubtful parts before.
 void find_passages(const Bvh& bvh, const Cut& cut, const CappedLevels& capped, std::span<const MeshSolid> solids,
                    RayHit16& rays, Passages& passages) {
     for (std::vector<Passage>& lane : passages) lane.clear();
     const Scene& scene = bvh.scene();
-    for (int i = 0; i < kLanes && capped.doubtful; ++i)
-        if (rays.active(i)) rays.tfar[i] = kInfinity;
-    for_each_crossing(bvh, rays, [&](const Crossing& c) {
-        if (cut.cap_of(c.part) == CapRule::none) return;
-        const int sign = crossing_sign(solids[scene.parts[index(c.part)].mesh], c.triangle, c.entering);
-        if (sign != 0) passages[std::size_t(c.lane)].push_back({c.t, sign, {c.part, c.triangle, c.u, c.v}});
-    });
+    bool doubtful[kLanes] = {}, any = false;
+    const auto collect = [&] {
+        for_each_crossing(bvh, rays, [&](const Crossing& c) {
+            if (cut.cap_of(c.part) == CapRule::none) return;
+            const MeshSolid& solid = solids[scene.parts[index(c.part)].mesh];
+            const int sign = crossing_sign(solid, c.triangle, c.entering);
+            if (sign == 0) return;
+            passages[std::size_t(c.lane)].push_back({c.t, sign, {c.part, c.triangle, c.u, c.v}});
+            if (capped.doubtful && !doubtful[c.lane] && has_gaps(solid)) doubtful[c.lane] = any = true;
+        });
+    };
+    collect();
+    if (any) {
+        // Only rays that pass a part with gaps are followed beyond the cut.
+        for (int i = 0; i < kLanes; ++i) {
+            if (!doubtful[i]) {
+                rays.clear(i);
+                continue;
+            }
+            rays.tnear[i] = std::nextafter(rays.tfar[i], kInfinity);
+            rays.tfar[i] = kInfinity;
+        }
+        collect();
+    }
     for (std::vector<Passage>& lane : passages) {
         if (lane.empty()) continue;
         std::sort(lane.begin(), lane.end(), [](const Passage& a, const Passage& b) {
@@ -87,7 +104,7 @@ void find_passages(const Bvh& bvh, const Cut& cut, const CappedLevels& capped, s
             return a.surface.triangle < b.surface.triangle;
         });
         lane.erase(std::unique(lane.begin(), lane.end(), is_repeated), lane.end());
-        if (capped.doubtful) drop_unbalanced(scene, solids, lane);
+        if (any) drop_unbalanced(scene, solids, lane);
     }
 }
 
@@ -185,13 +202,30 @@ CapLanes find_caps(const Bvh& bvh, const Cut& cut, const Caps& known, RayHit16& 
 
 namespace {
 
-/// How deep the level is cut at a pixel centre.
-CutDepth cut_at(const Cut& cut, std::size_t level, int x, int y) {
-    const CutProfile p = cut.levels[level].at_or(x, y, CutProfile{});
-    const float inside = -cut.distance.at_or(x, y, 1.0f);
-    if (inside < 0) return {};
-    return {p.depth(inside), p.on_chamfer(inside)};
-}
+/// How deep each level is cut at the pixel centres of a tile and a few around.
+class TileDepths {
+public:
+    TileDepths(const Cut& cut, const CappedLevels& capped, Rect tile) {
+        const Rect w = tile.grown(kAround);
+        for (std::size_t k = 0; k < cut.levels.size(); ++k) {
+            if (!capped.any[k]) continue;
+            levels_[k] = Image<CutDepth>(w);
+            const Rect known = w.intersected(cut.distance.window());
+            for (int y = known.y0; y < known.y1; ++y)
+                for (int x = known.x0; x < known.x1; ++x) {
+                    const float inside = -cut.distance(x, y);
+                    if (inside < 0) continue;
+                    const CutProfile& p = cut.levels[k](x, y);
+                    levels_[k](x, y) = {p.depth(inside), p.on_chamfer(inside)};
+                }
+        }
+    }
+    [[nodiscard]] const CutDepth& at(std::size_t level, int x, int y) const { return levels_[level](x, y); }
+
+private:
+    static constexpr int kAround = 4; ///< flat blocks begin up to three pixels off the tile
+    Image<CutDepth> levels_[kMostLevels];
+};
 
 /// The chamfer's depth, also a little beyond its ends.
 float sloped(const CutProfile& p, float inside) { return std::min(p.floor, p.front + p.slope * (inside - p.start)); }
@@ -199,7 +233,8 @@ float sloped(const CutProfile& p, float inside) { return std::min(p.floor, p.fro
 /// Makes the mesh of one tile.
 class TileMesh {
 public:
-    TileMesh(const Cut& cut, const Scene& scene, CapMesh& mesh) : cut_(cut), scene_(scene), mesh_(mesh) {}
+    TileMesh(const Cut& cut, const TileDepths& depths, const Scene& scene, CapMesh& mesh)
+        : cut_(cut), depths_(depths), scene_(scene), mesh_(mesh) {}
 
     /// The square of one capped pixel.
     void add_pixel(std::size_t level, int x, int y, const SurfaceRef& cap) {
@@ -209,7 +244,7 @@ public:
     /// A square of `size` pixels whose corners lie at the cut depths of its corner pixels.
     void add_flat(std::size_t level, int x, int y, int size, const SurfaceRef& cap) {
         add_square(cap, x, y, size, [&](int cx, int cy) {
-            return cut_at(cut_, level, cx == x ? x : x + size - 1, cy == y ? y : y + size - 1).depth;
+            return depths_.at(level, cx == x ? x : x + size - 1, cy == y ? y : y + size - 1).depth;
         });
     }
 
@@ -242,16 +277,15 @@ private:
     /// slope joins make of it. On the chamfer each goes on with its own slope, so that squares
     /// at its edges lie in it as well.
     [[nodiscard]] float corner_depth(std::size_t level, int x, int y, int cx, int cy) const {
-        const CutDepth own = cut_at(cut_, level, x, y);
-        const float inside = -cut_.distance_at(float(cx), float(cy));
+        const CutDepth own = depths_.at(level, x, y);
         float sum = 0;
         int n = 0;
         for (int py = cy - 1; py <= cy; ++py)
             for (int px = cx - 1; px <= cx; ++px) {
-                const CutDepth d = cut_at(cut_, level, px, py);
+                const CutDepth d = depths_.at(level, px, py);
                 if (d.depth == -kInfinity || is_cut_step(cut_.view, own, d)) continue;
                 const CutProfile& p = cut_.levels[level](px, py);
-                sum += d.chamfer ? sloped(p, inside) : d.depth;
+                sum += d.chamfer ? sloped(p, -cut_.distance_at(float(cx), float(cy))) : d.depth;
                 ++n;
             }
         return sum / float(n);
@@ -262,6 +296,7 @@ private:
     }
 
     const Cut& cut_;
+    const TileDepths& depths_;
     const Scene& scene_;
     CapMesh& mesh_;
 };
@@ -270,8 +305,9 @@ private:
 class TileCaps {
 public:
     TileCaps(const Bvh& bvh, const Cut& cut, const CappedLevels& capped, const Image<PartId>& targets, Caps& caps,
-             CapMesh& mesh)
-        : bvh_(bvh), cut_(cut), capped_(capped), targets_(targets), caps_(caps), mesh_(cut, bvh.scene(), mesh) {}
+             CapMesh& mesh, Rect tile)
+        : bvh_(bvh), cut_(cut), capped_(capped), targets_(targets), caps_(caps), depths_(cut, capped, tile),
+          mesh_(cut, depths_, bvh.scene(), mesh) {}
 
     std::int64_t trace_block(Rect tile, int x0, int y0) {
         RayHit16 rays;
@@ -323,22 +359,22 @@ private:
         float depth = -kInfinity;
         for (std::size_t k = 0; k < cut_.levels.size(); ++k) {
             if (!capped_.any[k]) continue;
-            const CutDepth own = cut_at(cut_, k, x, y);
+            const CutDepth own = depths_.at(k, x, y);
             if (capped_.at(k, own.chamfer)) depth = std::max(depth, own.depth);
             if (!capped_.solids[k] || own.depth == -kInfinity) continue;
-            for (const Vec2i d : kNeighbours) depth = std::max(depth, cut_at(cut_, k, x + d.x, y + d.y).depth);
+            for (const Vec2i d : kNeighbours) depth = std::max(depth, depths_.at(k, x + d.x, y + d.y).depth);
         }
         return depth;
     }
 
     void store(std::span<const Passage> lane, std::size_t level, int x, int y, float depth_per_t) {
-        const CutDepth own = cut_at(cut_, level, x, y);
+        const CutDepth own = depths_.at(level, x, y);
         if (own.depth == -kInfinity) return;
         if (capped_.at(level, own.chamfer))
             caps_.levels[level](x, y) = cap_at(cut_, lane, level, own.depth / depth_per_t, own.chamfer, inside_);
         if (!capped_.solids[level]) return;
         for (const Vec2i d : kNeighbours) {
-            const CutDepth other = cut_at(cut_, level, x + d.x, y + d.y);
+            const CutDepth other = depths_.at(level, x + d.x, y + d.y);
             if (!is_cut_step(cut_.view, own, other)) continue;
             // Seen from the deeper pixel the shallower one's material is a wall. Beyond the
             // opening nothing is cut: there this pixel's own material stands for the neighbour's.
@@ -380,13 +416,13 @@ private:
         if (!cap.contains(bx, by) || !cap.contains(bx + last, by + last)) return false;
         const PartId part = cap(bx, by).part;
         if (part == kNoPart) return false;
-        const float d00 = cut_at(cut_, level, bx, by).depth, d10 = cut_at(cut_, level, bx + last, by).depth;
-        const float d01 = cut_at(cut_, level, bx, by + last).depth;
-        const float d11 = cut_at(cut_, level, bx + last, by + last).depth;
+        const float d00 = depths_.at(level, bx, by).depth, d10 = depths_.at(level, bx + last, by).depth;
+        const float d01 = depths_.at(level, bx, by + last).depth;
+        const float d11 = depths_.at(level, bx + last, by + last).depth;
         const float near = 0.5f * cut_.view.pixel_size(d00);
         for (int y = 0; y < size; ++y)
             for (int x = 0; x < size; ++x) {
-                const CutDepth d = cut_at(cut_, level, bx + x, by + y);
+                const CutDepth d = depths_.at(level, bx + x, by + y);
                 if (cap(bx + x, by + y).part != part || d.chamfer) return false;
                 const float u = float(x) / float(last), v = float(y) / float(last);
                 const float plane = (d00 * (1 - u) + d10 * u) * (1 - v) + (d01 * (1 - u) + d11 * u) * v;
@@ -400,6 +436,7 @@ private:
     const CappedLevels& capped_;
     const Image<PartId>& targets_;
     Caps& caps_;
+    TileDepths depths_;
     TileMesh mesh_;
     Passages passages_;
     Inside inside_;
@@ -461,7 +498,7 @@ Caps trace_caps(const Bvh& bvh, const Cut& cut, std::span<const MeshSolid> solid
     };
     std::atomic<std::int64_t> traced{0};
     parallel_for_tiles(box, kTile, control, [&](Rect tile) {
-        TileCaps work(bvh, cut, capped, targets, caps, piece_of(tile));
+        TileCaps work(bvh, cut, capped, targets, caps, piece_of(tile), tile);
         std::int64_t n = 0;
         for (int y = tile.y0 & ~3; y < tile.y1; y += 4)
             for (int x = tile.x0 & ~3; x < tile.x1; x += 4) n += work.trace_block(tile, x, y);
