@@ -20,7 +20,8 @@ void add_primary(const Settings& settings);
 void add_refine(const Settings& settings);
 
 /// antialias/SCENE/{one,uniform:16,edges:N,adaptive:N}: 16 samples in every pixel, and at most N where
-/// neighbours differ, every pixel traced or by adaptive refinement. Counters: dB against 256 samples in every pixel, samples (a pixel, on average).
+/// neighbours differ, every pixel traced or by adaptive refinement. Counters: dB against 256 samples in every pixel,
+/// samples (a pixel, on average).
 void add_antialias(const Settings& settings);
 
 /// contours/SCENE/TARGETS/{paper,paper_flat,full,exact,fast}. Counters: complete (share of the contour pixels of

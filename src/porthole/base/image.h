@@ -2,11 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <memory>
 #include <new>
 #include <span>
@@ -96,8 +97,8 @@ private:
         void operator()(T* p) const { std::free(p); }
     };
     static bool is_zeros(const T& value) {
-        constexpr unsigned char zeros[sizeof(T)] = {};
-        return std::memcmp(&value, zeros, sizeof(T)) == 0;
+        const auto bytes = std::bit_cast<std::array<unsigned char, sizeof(T)>>(value);
+        return std::ranges::all_of(bytes, [](unsigned char b) { return b == 0; });
     }
     void allocate(std::size_t n, bool zeros) {
         if (n > std::size_t(PTRDIFF_MAX) / sizeof(T)) throw std::bad_alloc();
