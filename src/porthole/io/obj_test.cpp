@@ -5,32 +5,24 @@
 #include <gtest/gtest.h>
 
 #include "porthole/io/image_file.h"
+#include "support/reading.h"
 #include "support/temporary_folder.h"
 
 namespace porthole {
 namespace {
 
+using test::codes;
 using test::TemporaryFolder;
 
 Scene read(std::string text, const std::filesystem::path& path = "model.obj") {
     return read_obj(FileBytes(std::move(text)), path, {}, {});
 }
 std::string code_of(std::string text) {
-    try {
-        (void)read(std::move(text));
-    } catch (const Error& error) {
-        return error.code + " " + error.where;
-    }
-    return "none";
+    return test::code_of([&] { (void)read(std::move(text)); });
 }
 std::vector<std::string> paths(const Scene& scene) {
     std::vector<std::string> out;
     for (const Part& part : scene.parts) out.push_back(part.path);
-    return out;
-}
-std::vector<std::string> codes(const Scene& scene) {
-    std::vector<std::string> out;
-    for (const Warning& w : scene.warnings) out.push_back(w.code);
     return out;
 }
 

@@ -6,26 +6,19 @@
 #include <gtest/gtest.h>
 
 #include "porthole/io/image_file.h"
+#include "support/reading.h"
 #include "support/temporary_folder.h"
 
 namespace porthole {
 namespace {
 
+using test::codes;
+
 Scene read(std::string text, const std::filesystem::path& path = "model.ply") {
     return read_ply(FileBytes(std::move(text)), path, {}, {});
 }
 std::string code_of(std::string text) {
-    try {
-        (void)read(std::move(text));
-    } catch (const Error& error) {
-        return error.code + " " + error.where;
-    }
-    return "none";
-}
-std::vector<std::string> codes(const Scene& scene) {
-    std::vector<std::string> out;
-    for (const Warning& w : scene.warnings) out.push_back(w.code);
-    return out;
+    return test::code_of([&] { (void)read(std::move(text)); });
 }
 
 std::string header(const std::string& format, const std::string& vertex, const std::string& rest) {

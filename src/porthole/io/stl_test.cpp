@@ -4,24 +4,18 @@
 
 #include <gtest/gtest.h>
 
+#include "support/reading.h"
+
 namespace porthole {
 namespace {
+
+using test::codes;
 
 Scene read(std::string text, const std::filesystem::path& path = "model.stl") {
     return read_stl(FileBytes(std::move(text)), path, {}, {});
 }
 std::string code_of(std::string text) {
-    try {
-        (void)read(std::move(text));
-    } catch (const Error& error) {
-        return error.code + " " + error.where;
-    }
-    return "none";
-}
-std::vector<std::string> codes(const Scene& scene) {
-    std::vector<std::string> out;
-    for (const Warning& w : scene.warnings) out.push_back(w.code);
-    return out;
+    return test::code_of([&] { (void)read(std::move(text)); });
 }
 
 std::string binary(const std::vector<Vec3f>& corners, std::uint32_t count, std::string header = "made by hand") {
