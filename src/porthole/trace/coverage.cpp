@@ -20,7 +20,7 @@ constexpr std::size_t kChunkTriangles = 32768; ///< worth a thread
 
 using Matrix = double[3][3];
 
-/// Entries' absolute values: by these errors travel.
+/// The linear part, by row and column.
 void columns_of(const Affine3d& a, Matrix& m) {
     const Vec3d columns[3] = {a.x, a.y, a.z};
     for (int j = 0; j < 3; ++j) m[0][j] = columns[j].x, m[1][j] = columns[j].y, m[2][j] = columns[j].z;
